@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import pytest
-from scipy.signal import lfilter, savgol_filter
+from scipy.signal import butter, lfilter, savgol_filter
 
 import tvident
 from parameters import long
@@ -86,6 +86,50 @@ def test_no_worse_than_the_best_filter(kind: str, colour: str) -> None:
         low, high = COVERAGE
         assert (np.mean(covered, axis=0) >= low).all(), covered
         assert (np.mean(covered, axis=0)[1:] <= high).all(), covered
+
+
+LOW_PASSES = {
+    "mean of two": (np.full(2, 0.5), [1.0]),
+    "mean of five": (np.full(5, 0.2), [1.0]),
+    "mean of nine": (np.full(9, 1 / 9), [1.0]),
+    "two poles": ([1.0], np.convolve([1.0, -0.7], [1.0, -0.4])),
+    "Butterworth": butter(2, 100.0, fs=RATE),
+}
+
+
+def low_passed(name: str, seed: int) -> Array:
+    """Return noise of variance one behind a filter."""
+    passed = lfilter(*LOW_PASSES[name], np.random.default_rng(seed).standard_normal(SAMPLES + 2000))[2000:]
+    return np.asarray(passed / passed.std(), dtype=np.float64)
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("name", LOW_PASSES)
+@pytest.mark.parametrize("kind", ["sine", "several sines"])
+def test_low_passed_noise_is_no_motion(kind: str, name: str) -> None:
+    """It falls faster than sums of first-order noises: taken for motion, it made second derivatives 200 to 1800 times worse."""
+    truth = motion(kind)
+    ratios, covered = [], []
+    for seed in range(3):
+        y = truth[0] + 0.03 * low_passed(name, seed)
+        fit = tvident.fit_local_polynomials(y, "auto", sample_rate=RATE)
+        errors = [(fit.derivatives[d] - truth[d]) for d in range(3)]
+        ratios.append([rms(errors[d][INSIDE]) / best_filter(y, truth[d], d) for d in range(3)])
+        covered.append([np.mean(np.abs(errors[d]) <= 1.96 * fit.stderr[d]) for d in range(3)])
+    assert (np.exp(np.mean(np.log(ratios), axis=0)) <= 1.0).all(), ratios
+    assert (np.mean(covered, axis=0) >= COVERAGE[0]).all(), covered
+
+
+@pytest.mark.parametrize("noisy", [0.0, 1e-3, 0.1])
+def test_a_motion_of_limited_band_is_no_noise(noisy: float) -> None:
+    # Up to a tenth of the sample rate, as flat as noise below.
+    generator = np.random.default_rng(1)
+    waves = np.linspace(0.015, 0.62, 40)
+    phases = np.outer(np.arange(SAMPLES), waves) + generator.uniform(0, 6.28, waves.size)
+    y = np.sin(phases).sum(axis=1) + noisy * generator.standard_normal(SAMPLES)
+    fit = tvident.fit_local_polynomials(y, "auto")
+    slope = (waves * np.cos(phases)).sum(axis=1)
+    assert rms((fit.derivatives[1] - slope)[INSIDE]) < 0.05 * rms(slope)
 
 
 @pytest.mark.parametrize("kind", ["constant", "line"])

@@ -150,7 +150,7 @@ def fit_local_polynomials(
 
     With ``window_length="auto"`` every derivative has a window and an order of its own: those with the least estimated mean squared
     error :math:`b^2 + k^T Γ k` over the record, ``b`` the bias, ``k`` the weights of the samples and ``Γ`` the covariance of the noise,
-    white or coloured, which is found in records of 800 samples and more. The candidates near them
+    white, coloured or low-passed, which is found in records of 800 samples and more. The candidates near them
     are weighted again in every neighbourhood of five half-widths, so that estimates follow a signal that changes. Near the ends
     coefficients are shrunk towards what other windows predict. The error of θ̈ of the simulated rig is within 3 % of that of the best
     window and order known afterwards, and 20 to 30 % below it if the signal is a chirp. Windows that contain a value that is not finite

@@ -9,7 +9,7 @@ use tvident::auto_derivatives::{
     AutomaticEstimates as Slices, AutomaticOptions, AutomaticRecord, estimate_automatically as core_estimate,
 };
 use tvident::exec::{Watch, workers as threads};
-use tvident::noise::{coloured_noise, noise};
+use tvident::noise::{coloured_or_low_passed_noise, noise};
 use tvident::simd::Instructions;
 
 use crate::arrays::zeros;
@@ -65,7 +65,7 @@ pub(crate) fn estimate_automatically<'py>(
             let mut flags = vec![0; count];
             for (index, record) in records.iter().enumerate() {
                 let found = noise(record, quantisation, instructions)?;
-                let coloured = coloured_noise(record, found.sigma * found.sigma, instructions);
+                let coloured = coloured_or_low_passed_noise(record, found.sigma * found.sigma, instructions);
                 noises.push((coloured.variance().sqrt(), found.quantisation));
                 let prepared = AutomaticRecord::new(record, &coloured, highest, instructions)?;
                 for (row, &derivative) in derivatives.iter().enumerate() {

@@ -40,7 +40,7 @@ const LOW: [Range<usize>; 4] = [8..12, 5..8, 3..5, 2..3];
 
 /// So many of the shortest windows agree where noise is white; so many at least must be explained by coloured noise.
 const WHITE: usize = 4;
-const FEWEST: usize = 7;
+pub(crate) const FEWEST: usize = 7;
 
 /// The frequency where the density of a first-order noise is half its largest, in radians a sample: this one, and so many half as
 /// large, each than the last.
@@ -77,7 +77,11 @@ const CHANGE: f64 = 1e-6;
 static POWERS: Kept<(usize, usize), Arc<[f64]>> = Kept::new();
 
 /// What some degrees of windows of one length measure.
-struct Statistic {
+#[derive(Clone)]
+pub(crate) struct Statistic {
+    /// Of the windows, and the degrees.
+    pub(crate) half: usize,
+    pub(crate) degrees: Range<usize>,
     /// Angular frequency per sample, about.
     frequency: f64,
     /// Mean of the squared coefficients, relative standard deviation of that mean, and kurtosis of the coefficients.
@@ -88,36 +92,66 @@ struct Statistic {
     of_noises: Arc<[f64]>,
 }
 
+impl Statistic {
+    /// What was measured, beside noises of other powers.
+    pub(crate) fn beside(&self, of_noises: Arc<[f64]>) -> Self {
+        Self { of_noises, ..self.clone() }
+    }
+}
+
+/// A noise that explains what is measured.
+pub(crate) struct Colour {
+    pub(crate) noise: CorrelatedNoise,
+    /// The lowest angular frequency per sample at which it was seen.
+    pub(crate) lowest: f64,
+    /// Whether it explains all that is measured: no signal ends it.
+    pub(crate) whole: bool,
+}
+
 /// The noise of a channel, whose variance is given for the case that it is white or that its colour cannot be told.
 pub fn coloured_noise(record: &dyn Samples, variance: f64, instructions: Instructions) -> CorrelatedNoise {
-    let white = CorrelatedNoise::white(variance);
+    let measured = measure(record, variance, instructions);
+    let coloured = measured.and_then(|measured| coloured(&measured)).filter(|found| !found.noise.is_white());
+    coloured.map_or(CorrelatedNoise::white(variance), |found| found.noise)
+}
+
+/// What windows of all lengths measure of a channel; `None` where its noise is white, where it is not noise or the record too short to tell.
+pub(crate) fn measure(record: &dyn Samples, variance: f64, instructions: Instructions) -> Option<Vec<Statistic>> {
     let halves: Vec<usize> = HALVES.into_iter().filter(|half| half * PART <= record.len()).collect();
     if halves.len() < FEWEST || variance.is_nan() || variance <= 0.0 {
-        return white;
+        return None;
     }
     let mut measured = Vec::new();
     for &half in &halves[..WHITE] {
         measured.extend(look(record, half, &[HIGH], instructions));
     }
     if measured.len() < WHITE || explains(&measured, &[0]).is_some() || measured[TAILS].kurtosis > KURTOSIS {
-        return white;
+        return None;
     }
     for &half in &halves[WHITE..] {
         let longest = half == halves[halves.len() - 1];
         let degrees: Vec<Range<usize>> = std::iter::once(HIGH).chain(LOW.into_iter().filter(|_| longest)).collect();
         measured.extend(look(record, half, &degrees, instructions));
     }
-    coloured(&measured).unwrap_or(white)
+    Some(measured)
 }
 
-/// The coloured noise that explains what is measured, from the highest frequencies on, or `None`.
-fn coloured(measured: &[Statistic]) -> Option<CorrelatedNoise> {
+/// How many of what is measured, from the highest frequencies on, noises explain; `None` where these are too few.
+pub(crate) fn explained(measured: &[Statistic]) -> Option<usize> {
     let all: Vec<usize> = (0..=corners().count()).collect();
-    let explained =
-        (WHITE..=measured.len()).take_while(|&count| explains(&measured[..count], &all).is_some()).last()?;
-    if explained < FEWEST {
-        return None;
-    }
+    let counts = WHITE..=measured.len();
+    let explained = counts.take_while(|&count| explains(&measured[..count], &all).is_some()).last();
+    explained.filter(|&explained| explained >= FEWEST)
+}
+
+/// By how much all noises together miss what is measured, squared and summed.
+pub(crate) fn missed(measured: &[Statistic]) -> f64 {
+    fit(measured, &(0..=corners().count()).collect::<Vec<_>>()).0
+}
+
+/// The noise that explains what is measured, from the highest frequencies on, or `None`.
+pub(crate) fn coloured(measured: &[Statistic]) -> Option<Colour> {
+    let explained = explained(measured)?;
     // The last may hold some of the signal that ends the sequence.
     let whole = explained == measured.len();
     let part = &measured[..if whole { explained } else { explained - 1 }];
@@ -156,8 +190,7 @@ fn coloured(measured: &[Statistic]) -> Option<CorrelatedNoise> {
     extend(&mut first_order, white, lowest);
     let found = CorrelatedNoise::new(white, first_order);
     let steep = found.density(lowest) > STEEPEST * found.density(8.0 * lowest);
-    let no_noise = found.is_white() || (whole && steep);
-    (!no_noise).then_some(found)
+    (!(whole && steep)).then_some(Colour { noise: found, lowest, whole })
 }
 
 /// Continues noise of density `1/f` to lower frequencies than are measured. The noises of one octave after the other have the same variance `a`
@@ -177,7 +210,7 @@ fn extend(first_order: &mut Vec<(f64, f64)>, white: f64, lowest: f64) {
 }
 
 /// The corners of the first-order noises.
-fn corners() -> impl Iterator<Item = f64> {
+pub(crate) fn corners() -> impl Iterator<Item = f64> {
     (0..OCTAVES).map(|octave| CORNER * f64::from(-octave).exp2())
 }
 
@@ -212,6 +245,8 @@ fn look(record: &dyn Samples, half: usize, groups: &[Range<usize>], instructions
         let power = mean(&squares[own.clone()]);
         let independent = (group.len() * used.min(record.len())) as f64 / length as f64;
         Statistic {
+            half,
+            degrees: group.clone(),
             frequency: (group.start + group.end + 1) as f64 / 2.0 / half as f64,
             power,
             deviation: (2.0 / independent + MISFIT * MISFIT).sqrt(),

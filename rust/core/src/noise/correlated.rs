@@ -3,42 +3,56 @@
 //! A first-order noise has the autocovariance `a ρ^|l|`. Sums of several of them with `a ≥ 0`, their memories doubled from one to the next,
 //! come near every spectrum that falls at most with the square of the frequency: autoregressive noise of the first order, and noise of
 //! density `1/f` (a sum of relaxations, as Bernamont found it in resistors in 1937). A sequence is multiplied by such a covariance
-//! matrix in two recursions.
+//! matrix in two recursions. All of them may have gone through one filter, whose autocovariances are few: those of the noise are convolved with them.
 
-/// White noise and first-order noises.
+/// White noise and first-order noises, as they are or behind a filter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CorrelatedNoise {
     white: f64,
     /// `ρ` and `a` of each.
     first_order: Vec<(f64, f64)>,
+    /// Autocovariances of white noise of variance one behind the filter, from lag zero on; none without a filter.
+    filter: Vec<f64>,
 }
 
 impl CorrelatedNoise {
     /// White noise of some variance.
     #[must_use]
     pub fn white(variance: f64) -> Self {
-        Self { white: variance, first_order: Vec::new() }
+        Self::new(variance, Vec::new())
     }
 
     /// White noise and noises with the autocovariances `variance · correlation^|lag|`, given as correlation and variance.
     #[must_use]
     pub fn new(white: f64, first_order: Vec<(f64, f64)>) -> Self {
-        Self { white, first_order }
+        Self { white, first_order, filter: Vec::new() }
+    }
+
+    /// The same noise behind a filter, which makes such autocovariances of white noise of variance one.
+    pub(crate) fn behind(self, filter: Vec<f64>) -> Self {
+        Self { filter, ..self }
     }
 
     /// The variance of a sample.
     #[must_use]
     pub fn variance(&self) -> f64 {
-        self.white + self.first_order.iter().map(|(_, variance)| variance).sum::<f64>()
+        let Some((&own, others)) = self.filter.split_first() else {
+            return self.white + self.first_order.iter().map(|(_, variance)| variance).sum::<f64>();
+        };
+        let of = |&(correlation, variance): &(f64, f64)| {
+            let others = others.iter().rev().fold(0.0, |sum, other| correlation * (sum + other));
+            variance * (own + 2.0 * others)
+        };
+        self.white * own + self.first_order.iter().map(of).sum::<f64>()
     }
 
     /// Whether samples are independent.
     #[must_use]
     pub fn is_white(&self) -> bool {
-        self.first_order.is_empty()
+        self.first_order.is_empty() && self.filter.is_empty()
     }
 
-    /// The noise whose covariances are the means of those of some noises.
+    /// Of noises that went through no filter, the noise whose covariances are the means of those of some noises.
     pub(crate) fn mean(noises: &[&Self]) -> Self {
         let share = 1.0 / noises.len().max(1) as f64;
         let mut mean = Self::white(noises.iter().map(|noise| share * noise.white).sum());
@@ -54,7 +68,8 @@ impl CorrelatedNoise {
     /// The same white noise with a part of the others.
     pub(crate) fn with_part(&self, part: f64) -> Self {
         let first_order = self.first_order.iter().map(|&(correlation, variance)| (correlation, part * variance));
-        Self { white: self.white, first_order: if part > 0.0 { first_order.collect() } else { Vec::new() } }
+        let first_order = if part > 0.0 { first_order.collect() } else { Vec::new() };
+        Self { white: self.white, first_order, filter: self.filter.clone() }
     }
 
     /// Samples over which the slowest of the noises falls to a part of `1/e`.
@@ -69,7 +84,10 @@ impl CorrelatedNoise {
             variance * (1.0 - correlation * correlation)
                 / (1.0 + correlation * correlation - 2.0 * correlation * frequency.cos())
         };
-        self.white + self.first_order.iter().map(of).sum::<f64>()
+        let before = self.white + self.first_order.iter().map(of).sum::<f64>();
+        let Some((own, others)) = self.filter.split_first() else { return before };
+        let others: f64 = others.iter().zip(1..).map(|(other, lag)| other * (frequency * f64::from(lag)).cos()).sum();
+        before * (own + 2.0 * others).max(0.0)
     }
 
     /// The product of the matrix of correlations (its diagonal is one) and a sequence.
@@ -78,6 +96,23 @@ impl CorrelatedNoise {
             return sequence.to_vec();
         }
         let total = self.variance();
+        let Some((own, others)) = self.filter.split_first() else { return self.before_filter(sequence, total) };
+        let (reach, length) = (others.len(), sequence.len());
+        let mut padded = vec![0.0; length + 2 * reach];
+        padded[reach..reach + length].copy_from_slice(sequence);
+        let before = self.before_filter(&padded, total);
+        let mut product: Vec<f64> = before[reach..reach + length].iter().map(|value| own * value).collect();
+        for (other, lag) in others.iter().zip(1..) {
+            let (earlier, later) = (&before[reach - lag..], &before[reach + lag..]);
+            for ((product, one), two) in product.iter_mut().zip(earlier).zip(later) {
+                *product += other * (one + two);
+            }
+        }
+        product
+    }
+
+    /// The product of the covariances before the filter, over some variance, and a sequence.
+    fn before_filter(&self, sequence: &[f64], total: f64) -> Vec<f64> {
         let mut product: Vec<f64> = sequence.iter().map(|value| value * (self.white / total)).collect();
         for &(correlation, variance) in &self.first_order {
             let share = variance / total;
@@ -126,6 +161,26 @@ mod tests {
         assert_eq!(CorrelatedNoise::white(2.0).memory(), 0.0);
         assert_eq!(mean.with_part(0.5), CorrelatedNoise::new(1.0, vec![(0.5, 0.5), (0.9, 1.0)]));
         assert!(mean.with_part(0.0).is_white());
+    }
+
+    #[test]
+    fn behind_a_filter_covariances_are_convolved_with_its_own() {
+        let noise = CorrelatedNoise::new(0.5, vec![(0.6, 2.0)]);
+        // Means of two neighbours.
+        let filtered = noise.clone().behind(vec![0.5, 0.25]);
+        let before = |lag: i32| if lag == 0 { 2.5 } else { 2.0 * 0.6_f64.powi(lag.abs()) };
+        let after = |lag: i32| 0.5 * before(lag) + 0.25 * (before(lag - 1) + before(lag + 1));
+        assert!((filtered.variance() - after(0)).abs() < 1e-14);
+        let sequence: [f64; 5] = [1.0, -2.0, 0.5, 0.0, 3.0];
+        for (i, found) in (0..).zip(filtered.correlate(&sequence)) {
+            let row: f64 = (0..).zip(sequence).map(|(j, value)| value * after(i - j)).sum();
+            assert!((found - row / after(0)).abs() < 1e-14, "row {i}");
+        }
+        for frequency in [0.0, 0.7, 3.0_f64] {
+            let expected = noise.density(frequency) * (frequency / 2.0).cos().powi(2);
+            assert!((filtered.density(frequency) - expected).abs() < 1e-14);
+        }
+        assert!(!CorrelatedNoise::white(1.0).behind(vec![0.5, 0.25]).is_white());
     }
 
     #[test]

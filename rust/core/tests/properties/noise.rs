@@ -1,7 +1,7 @@
 //! The noise of a channel is found whatever its signal, and never below quantisation and rounding.
 
 use crate::random::uniform;
-use tvident::noise::{CorrelatedNoise, FEWEST_SAMPLES, coloured_noise, noise};
+use tvident::noise::{CorrelatedNoise, FEWEST_SAMPLES, coloured_noise, coloured_or_low_passed_noise, noise};
 use tvident::simd::Instructions;
 
 /// Sums of twelve uniform numbers: nearly normal, of variance one.
@@ -113,4 +113,46 @@ fn what_is_white_or_no_noise_has_no_colour() {
     assert!(colour(&steps).is_white());
     assert!(colour(&first_order(0.8, 14, |_| 0.0)[..500]).is_white());
     assert!(colour(&[f64::NAN; 2000]).is_white());
+}
+
+/// Noise of variance one behind a filter that the last samples go through, over a signal.
+fn behind(filter: &[f64], seed: u64, signal: impl Fn(f64) -> f64) -> Vec<f64> {
+    let size = filter.iter().map(|weight| weight * weight).sum::<f64>().sqrt();
+    let white = normal(seed, 20_000 + filter.len());
+    let passed = white.windows(filter.len()).map(|last| last.iter().zip(filter).map(|(e, w)| e * w).sum::<f64>());
+    passed.enumerate().map(|(i, e)| e / size + signal(i as f64)).collect()
+}
+
+#[test]
+fn noise_behind_a_low_pass_filter_is_told_from_motion() {
+    let colour = |samples: &[f64]| coloured_or_low_passed_noise(&samples, 0.1, Instructions::current());
+    // Means of neighbours, and two real poles.
+    let poles: Vec<f64> = (0..60).map(|k| 0.7_f64.powi(k + 1) - 0.4_f64.powi(k + 1)).collect();
+    for filter in [vec![1.0; 2], vec![1.0; 3], vec![1.0; 5], poles] {
+        for amplitude in [0.0, 30.0] {
+            let found = colour(&behind(&filter, 7, |i| amplitude * (i * 0.02).sin()));
+            let size: f64 = filter.iter().map(|weight| weight * weight).sum();
+            for frequency in [0.05, 0.1, 0.3, 0.6] {
+                let turned = |part: fn(f64) -> f64| -> f64 {
+                    (0..).zip(&filter).map(|(k, weight)| weight * part(f64::from(k) * frequency)).sum()
+                };
+                let truth = (turned(f64::cos).powi(2) + turned(f64::sin).powi(2)) / size;
+                let ratio = found.density(frequency) / truth;
+                assert!((0.7..=1.4).contains(&ratio), "{} at {frequency}: {ratio}", filter.len());
+            }
+            assert!((0.8..=1.25).contains(&found.variance()), "{}: {}", filter.len(), found.variance());
+        }
+    }
+}
+
+#[test]
+fn a_motion_of_limited_band_is_no_noise() {
+    let colour = |samples: &[f64]| coloured_or_low_passed_noise(&samples, 1e-6, Instructions::current());
+    // 40 waves up to a tenth of the sample rate, alone and with white noise.
+    let motion = |i: f64| (1..=40).map(|k| (i * 0.0157 * f64::from(k) + f64::from(k * k)).sin()).sum::<f64>();
+    for noise in [0.0, 1e-3, 0.1] {
+        let samples: Vec<f64> =
+            (0..20_000).zip(normal(3, 20_000)).map(|(i, e)| motion(f64::from(i)) + noise * e).collect();
+        assert!(colour(&samples).is_white(), "{noise}");
+    }
 }

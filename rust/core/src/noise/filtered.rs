@@ -1,0 +1,176 @@
+//! Noise that went through a low-pass filter with the channel: an amplifier's, an anti-alias filter, means of neighbours.
+//!
+//! Sums of first-order noises fall at most with the square of the frequency, so [`crate::noise::colour`] cannot tell such noise from motion. It is
+//! told by what lies below its filter: there it is as flat as white noise, or as a sum of first-order noises, and motion rises from it. So the
+//! sum is looked for behind Butterworth filters of some corners and orders,
+//!
+//! ```text
+//! S(ω) = (white + Σ_m a_m …) / (1 + (tan(ω/2) / tan(ω_c/2))^2p),
+//! ```
+//!
+//! behind Gaussian ones or means of neighbouring samples, and the filter is taken that explains most of what is measured. Butterworth's of the first order with a corner
+//! of a quarter of the sample rate is the mean of two.
+//!
+//! The noise must be seen an octave below the corner. Where no motion rises from it, a motion of limited band looks the same: then the corner must be
+//! higher than a motion's would be whose derivatives are worth asking for.
+
+use std::f64::consts::{LN_2, PI};
+use std::ops::RangeInclusive;
+
+use crate::local_polynomials::basis::Basis;
+use crate::noise::colour::{FEWEST, Statistic, coloured, corners, explained, measure, missed};
+use crate::noise::correlated::CorrelatedNoise;
+use crate::noise::transform::Transform;
+use crate::record::samples::Samples;
+use crate::simd::instructions::Instructions;
+
+/// The lowest corner in radians a sample, corners in an octave and in all, and the highest order.
+const LOWEST: f64 = 0.2;
+const EACH_OCTAVE: f64 = 16.0;
+const CORNERS: i32 = 57;
+const HIGHEST_ORDER: i32 = 4;
+
+/// Means of so many samples, and half of the power they pass, in radians.
+const MEANS: RangeInclusive<i32> = 3..=12;
+const HALF_OF_MEAN: f64 = 2.78;
+
+/// The least corner of noise that no motion rises from: a seventh of the sample rate.
+const ALONE: f64 = 0.9;
+
+/// Filters that are tried on all windows, of those that come near the shortest.
+const NEAREST: usize = 12;
+
+/// Times that the lowest frequency at which the noise must be seen lies below the corner.
+const BELOW: f64 = 2.0;
+
+/// Windows that a transform is long, at least: what is correlated over more is not told apart.
+const TIMES: usize = 4;
+const SHORTEST: usize = 512;
+
+/// Frequencies that autocovariances are summed from, and what is left out of the largest.
+const FREQUENCIES: usize = 4096;
+const NEGLIGIBLE: f64 = 1e-9;
+
+/// A filter that passes low frequencies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct LowPass {
+    /// Where half the power passes, in radians a sample.
+    corner: f64,
+    rolloff: Rolloff,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Rolloff {
+    /// Of some order.
+    Butterworth(i32),
+    /// The mean of so many samples.
+    Mean(i32),
+    /// Many means after one another, or a smooth weight.
+    Gaussian,
+}
+
+impl LowPass {
+    fn all() -> impl Iterator<Item = Self> {
+        let corners = (0..CORNERS).map(|place| LOWEST * (f64::from(place) / EACH_OCTAVE).exp2());
+        let of_corner = |corner: f64| {
+            let rolloffs = (1..=HIGHEST_ORDER).map(Rolloff::Butterworth).chain([Rolloff::Gaussian]);
+            rolloffs.map(move |rolloff| Self { corner, rolloff })
+        };
+        let mean = |samples: i32| Self { corner: HALF_OF_MEAN / f64::from(samples), rolloff: Rolloff::Mean(samples) };
+        corners.flat_map(of_corner).chain(MEANS.map(mean))
+    }
+
+    /// What it leaves of a density.
+    fn gain(self, frequency: f64) -> f64 {
+        match self.rolloff {
+            Rolloff::Butterworth(order) => {
+                let ratio = (frequency / 2.0).tan() / (self.corner / 2.0).tan();
+                1.0 / (1.0 + ratio.powi(2 * order))
+            }
+            // Sines in place of frequencies: without a bend at half the sample rate autocovariances are few.
+            Rolloff::Gaussian => (-LN_2 * ((frequency / 2.0).sin() / (self.corner / 2.0).sin()).powi(2)).exp(),
+            Rolloff::Mean(_) if frequency == 0.0 => 1.0,
+            Rolloff::Mean(samples) => {
+                let samples = f64::from(samples);
+                ((samples * frequency / 2.0).sin() / (samples * (frequency / 2.0).sin())).powi(2)
+            }
+        }
+    }
+
+    /// The autocovariances of white noise of variance one behind it.
+    fn autocovariances(self) -> Vec<f64> {
+        let gains: Vec<f64> = (0..=FREQUENCIES).map(|bin| self.gain(PI * bin as f64 / FREQUENCIES as f64)).collect();
+        let symmetric: Vec<f64> = gains.iter().chain(gains[1..FREQUENCIES].iter().rev()).copied().collect();
+        let sums = Transform::new(2 * FREQUENCIES).of(&symmetric);
+        let found: Vec<f64> = sums.iter().map(|[sum, _]| sum / (2 * FREQUENCIES) as f64).collect();
+        let last = found.iter().rposition(|one| one.abs() > NEGLIGIBLE * found[0]).unwrap_or(0);
+        found[..=last].to_vec()
+    }
+}
+
+/// The noise of a channel, white, coloured or low-passed, whose variance is given for the case that it is white or that its colour cannot be told.
+pub fn coloured_or_low_passed_noise(
+    record: &dyn Samples,
+    variance: f64,
+    instructions: Instructions,
+) -> CorrelatedNoise {
+    let white = CorrelatedNoise::white(variance);
+    let Some(measured) = measure(record, variance, instructions) else { return white };
+    let as_it_is = coloured(&measured).map(|found| found.noise).filter(|noise| !noise.is_white());
+    as_it_is.or_else(|| low_passed(&measured)).unwrap_or(white)
+}
+
+/// The noise that explains what is measured behind a filter, or `None`.
+fn low_passed(measured: &[Statistic]) -> Option<CorrelatedNoise> {
+    let spectra: Vec<Vec<Vec<f64>>> = measured.iter().map(spectra).collect::<Option<_>>()?;
+    let behind = |filter: LowPass, count: usize| -> Vec<Statistic> {
+        let one = |(one, spectra): (&Statistic, &Vec<Vec<f64>>)| {
+            let last = (spectra[0].len() - 1) as f64;
+            let gains: Vec<f64> = (0..spectra[0].len()).map(|bin| filter.gain(PI * bin as f64 / last)).collect();
+            let power = |of: &Vec<f64>| of.iter().zip(&gains).map(|(power, gain)| power * gain).sum::<f64>();
+            one.beside(spectra.iter().map(power).collect())
+        };
+        measured.iter().zip(&spectra).take(count).map(one).collect()
+    };
+    let mut filters: Vec<_> = LowPass::all().map(|filter| (missed(&behind(filter, FEWEST)), filter)).collect();
+    filters.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let judged = |&(_, filter): &(f64, LowPass)| {
+        let statistics = behind(filter, measured.len());
+        let explained = explained(&statistics)?;
+        let missed = missed(&statistics[..explained]);
+        Some((explained, missed, filter, statistics))
+    };
+    let nearest = filters.iter().take(NEAREST).filter_map(judged);
+    let best = nearest.max_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
+    let (_, _, filter, statistics) = best?;
+    let found = coloured(&statistics)?;
+    let is_seen = BELOW * found.lowest <= filter.corner && (!found.whole || filter.corner >= ALONE);
+    is_seen.then(|| found.noise.behind(filter.autocovariances()))
+}
+
+/// What some degrees of a window take of every noise of variance one, white and then by octave, at frequencies from zero to half the sample rate.
+fn spectra(of: &Statistic) -> Option<Vec<Vec<f64>>> {
+    // Windows are short, and little memory is not asked for.
+    let basis = Basis::new(2 * of.half + 1, of.degrees.end).ok()?;
+    let length = (TIMES * basis.length()).next_power_of_two().max(SHORTEST);
+    let transform = Transform::new(length);
+    let mut white = vec![0.0; length / 2 + 1];
+    for degree in of.degrees.clone() {
+        let mut padded: Vec<f64> = (0..basis.length()).map(|index| basis.value(degree, index)).collect();
+        padded.resize(length, 0.0);
+        for (power, [real, imaginary]) in white.iter_mut().zip(transform.of(&padded)) {
+            *power += (real * real + imaginary * imaginary) / of.degrees.len() as f64;
+        }
+    }
+    for (bin, power) in white.iter_mut().enumerate() {
+        // All but the first and the last stand for a negative frequency, too.
+        *power *= if bin == 0 || bin == length / 2 { 1.0 } else { 2.0 } / length as f64;
+    }
+    let of_octave = |corner: f64| {
+        let noise = CorrelatedNoise::new(0.0, vec![((-corner).exp(), 1.0)]);
+        let density = |bin: usize| noise.density(2.0 * PI * bin as f64 / length as f64);
+        white.iter().enumerate().map(|(bin, power)| power * density(bin)).collect()
+    };
+    let octaves: Vec<Vec<f64>> = corners().map(of_octave).collect();
+    Some(std::iter::once(white).chain(octaves).collect())
+}
