@@ -16,8 +16,10 @@
 
 use std::f64::consts::{LN_2, PI};
 use std::ops::RangeInclusive;
+use std::sync::Arc;
 
 use crate::local_polynomials::basis::Basis;
+use crate::local_polynomials::tables::Kept;
 use crate::noise::colour::{FEWEST, Statistic, coloured, corners, explained, measure, missed};
 use crate::noise::correlated::CorrelatedNoise;
 use crate::noise::transform::Transform;
@@ -50,6 +52,17 @@ const SHORTEST: usize = 512;
 /// Frequencies that autocovariances are summed from, and what is left out of the largest.
 const FREQUENCIES: usize = 4096;
 const NEGLIGIBLE: f64 = 1e-9;
+
+/// What windows take of every noise of variance one, at frequencies from zero to half the sample rate.
+type Spectra = Arc<[Vec<f64>]>;
+
+/// What windows take of every noise, behind every filter.
+type BehindAll = Arc<[Arc<[f64]>]>;
+
+/// Spectra by half-width and first degree; of short windows what they take behind every filter is kept instead, and counts as so large.
+static SPECTRA: Kept<(usize, usize), Spectra> = Kept::new();
+static BEHIND: Kept<(usize, usize), BehindAll> = Kept::new();
+const FILTERS_OF_SHORT: usize = 400;
 
 /// A filter that passes low frequencies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,9 +110,15 @@ impl LowPass {
         }
     }
 
+    /// What it leaves of densities at so many frequencies from zero to half the sample rate.
+    fn gains(self, frequencies: usize) -> Vec<f64> {
+        let last = frequencies.saturating_sub(1).max(1) as f64;
+        (0..frequencies).map(|bin| self.gain(PI * bin as f64 / last)).collect()
+    }
+
     /// The autocovariances of white noise of variance one behind it.
     fn autocovariances(self) -> Vec<f64> {
-        let gains: Vec<f64> = (0..=FREQUENCIES).map(|bin| self.gain(PI * bin as f64 / FREQUENCIES as f64)).collect();
+        let gains = self.gains(FREQUENCIES + 1);
         let symmetric: Vec<f64> = gains.iter().chain(gains[1..FREQUENCIES].iter().rev()).copied().collect();
         let sums = Transform::new(2 * FREQUENCIES).of(&symmetric);
         let found: Vec<f64> = sums.iter().map(|[sum, _]| sum / (2 * FREQUENCIES) as f64).collect();
@@ -122,20 +141,28 @@ pub fn coloured_or_low_passed_noise(
 
 /// The noise that explains what is measured behind a filter, or `None`.
 fn low_passed(measured: &[Statistic]) -> Option<CorrelatedNoise> {
-    let spectra: Vec<Vec<Vec<f64>>> = measured.iter().map(spectra).collect::<Option<_>>()?;
-    let behind = |filter: LowPass, count: usize| -> Vec<Statistic> {
-        let one = |(one, spectra): (&Statistic, &Vec<Vec<f64>>)| {
-            let last = (spectra[0].len() - 1) as f64;
-            let gains: Vec<f64> = (0..spectra[0].len()).map(|bin| filter.gain(PI * bin as f64 / last)).collect();
-            let power = |of: &Vec<f64>| of.iter().zip(&gains).map(|(power, gain)| power * gain).sum::<f64>();
-            one.beside(spectra.iter().map(power).collect())
-        };
-        measured.iter().zip(&spectra).take(count).map(one).collect()
+    let (short, long) = measured.split_at_checked(FEWEST)?;
+    let kept = |one: &Statistic| {
+        let place = (one.half, one.degrees.start);
+        BEHIND.try_get(place, FILTERS_OF_SHORT, || behind_all(one).ok_or(()))
     };
-    let mut filters: Vec<_> = LowPass::all().map(|filter| (missed(&behind(filter, FEWEST)), filter)).collect();
-    filters.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let judged = |&(_, filter): &(f64, LowPass)| {
-        let statistics = behind(filter, measured.len());
+    let short_behind: Vec<BehindAll> = short.iter().map(kept).collect::<Result<_, ()>>().ok()?;
+    let beside = |place: usize| short.iter().zip(&short_behind).map(move |(one, all)| one.beside(all[place].clone()));
+    let mut filters: Vec<_> = LowPass::all().enumerate().map(|(place, filter)| (place, filter, 0.0)).collect();
+    for (place, _, missing) in &mut filters {
+        *missing = missed(&beside(*place).collect::<Vec<_>>());
+    }
+    filters.sort_by(|a, b| a.2.total_cmp(&b.2));
+    let spectra_of = |one: &Statistic| {
+        let place = (one.half, one.degrees.start);
+        SPECTRA.try_get(place, one.half, || spectra(one).ok_or(()))
+    };
+    let of_long: Vec<Spectra> = long.iter().map(spectra_of).collect::<Result<_, ()>>().ok()?;
+    let longest = of_long.iter().map(|spectra| spectra[0].len()).max().unwrap_or(1);
+    let judged = |&(place, filter, _): &(usize, LowPass, f64)| {
+        let gains = filter.gains(longest);
+        let behind = long.iter().zip(&of_long).map(|(one, spectra)| one.beside(behind(spectra, &gains)));
+        let statistics: Vec<Statistic> = beside(place).chain(behind).collect();
         let explained = explained(&statistics)?;
         let missed = missed(&statistics[..explained]);
         Some((explained, missed, filter, statistics))
@@ -148,8 +175,21 @@ fn low_passed(measured: &[Statistic]) -> Option<CorrelatedNoise> {
     is_seen.then(|| found.noise.behind(filter.autocovariances()))
 }
 
+/// What some degrees of a window take of every noise behind every filter.
+fn behind_all(one: &Statistic) -> Option<BehindAll> {
+    let spectra = spectra(one)?;
+    Some(LowPass::all().map(|filter| behind(&spectra, &filter.gains(spectra[0].len()))).collect())
+}
+
+/// What is taken of every noise behind a filter of some gains, at as many frequencies as the spectra have or times as many less one.
+fn behind(spectra: &[Vec<f64>], gains: &[f64]) -> Arc<[f64]> {
+    let step = (gains.len() - 1) / (spectra[0].len() - 1);
+    let power = |of: &Vec<f64>| of.iter().zip(gains.iter().step_by(step)).map(|(power, gain)| power * gain).sum();
+    spectra.iter().map(power).collect()
+}
+
 /// What some degrees of a window take of every noise of variance one, white and then by octave, at frequencies from zero to half the sample rate.
-fn spectra(of: &Statistic) -> Option<Vec<Vec<f64>>> {
+fn spectra(of: &Statistic) -> Option<Spectra> {
     // Windows are short, and little memory is not asked for.
     let basis = Basis::new(2 * of.half + 1, of.degrees.end).ok()?;
     let length = (TIMES * basis.length()).next_power_of_two().max(SHORTEST);
@@ -172,5 +212,5 @@ fn spectra(of: &Statistic) -> Option<Vec<Vec<f64>>> {
         white.iter().enumerate().map(|(bin, power)| power * density(bin)).collect()
     };
     let octaves: Vec<Vec<f64>> = corners().map(of_octave).collect();
-    Some(std::iter::once(white).chain(octaves).collect())
+    Some(std::iter::once(white).chain(octaves).collect::<Vec<_>>().into())
 }
