@@ -57,6 +57,9 @@ _LEFT_OVER = (
 )
 """Flags of a record whose equations leave something over, or tell nothing apart."""
 
+_CONTRADICTED = _LEFT_OVER | Status.SCALES_DISAGREE | Status.KIND_CONTRADICTED
+"""Flags of a record whose model something contradicts."""
+
 Call = dict[str, Any]
 
 
@@ -129,8 +132,9 @@ class Trial:
         # Where a parameter changes constants explain too little to tell what is missing: they take what lets them follow the change.
         # What constants explain down to the noise needs nothing that changes.
         is_settled = of_constants is not None and of_constants.is_settled
-        beside = self._beside_changes() if is_changing and not is_settled else None
-        steady = self._beside_constant_stiffness() if is_changing and not is_settled else None
+        beside = steady = None
+        if is_changing and not is_settled:
+            beside, steady = self._beside_changes(), self._beside_constant_stiffness()
         # The simpler ones come first.
         tried = [one for one in (steady, of_constants, beside) if one is not None]
         least = min((one.ratio for one in tried), default=np.inf)
@@ -139,8 +143,7 @@ class Trial:
     @property
     def _worth(self) -> float:
         """What a model that is no simpler leaves at most of what the one at hand does not explain, to be advised."""
-        is_contradicted = self.result.record_status & (_LEFT_OVER | Status.SCALES_DISAGREE | Status.KIND_CONTRADICTED)
-        return _BETTER if is_contradicted else _BETTER_BY_FAR
+        return _BETTER if self.result.record_status & _CONTRADICTED else _BETTER_BY_FAR
 
     @property
     def _of_constants_alone(self) -> Call:
@@ -190,7 +193,7 @@ class Trial:
         if "varying" not in (self.result.settings["kinds"][name] for name in ("inertia", "damping")):
             return None
         found = self._tried({**self.given, "stiffness": "constant"}, self._of_constants_alone)
-        if found is None or found.record_status & (_LEFT_OVER | DOUBTFUL_RECORD | Status.KIND_CONTRADICTED):
+        if found is None or found.record_status & _CONTRADICTED:
             return None
         left, known = self._left_of(found), self._better_known(found)
         is_worth_it = left.ratio <= _BETTER or (left.is_as_much and known)
