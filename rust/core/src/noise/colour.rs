@@ -93,6 +93,11 @@ pub(crate) struct Statistic {
 }
 
 impl Statistic {
+    /// Half-width and first degree, which tell what is measured.
+    pub(crate) fn key(&self) -> (usize, usize) {
+        (self.half, self.degrees.start)
+    }
+
     /// What was measured, beside noises of other powers.
     pub(crate) fn beside(&self, of_noises: Arc<[f64]>) -> Self {
         Self { of_noises, ..self.clone() }

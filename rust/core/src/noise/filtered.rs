@@ -142,10 +142,7 @@ pub fn coloured_or_low_passed_noise(
 /// The noise that explains what is measured behind a filter, or `None`.
 fn low_passed(measured: &[Statistic]) -> Option<CorrelatedNoise> {
     let (short, long) = measured.split_at_checked(FEWEST)?;
-    let kept = |one: &Statistic| {
-        let place = (one.half, one.degrees.start);
-        BEHIND.try_get(place, FILTERS_OF_SHORT, || behind_all(one).ok_or(()))
-    };
+    let kept = |one: &Statistic| BEHIND.try_get(one.key(), FILTERS_OF_SHORT, || behind_all(one).ok_or(()));
     let short_behind: Vec<BehindAll> = short.iter().map(kept).collect::<Result<_, ()>>().ok()?;
     let beside = |place: usize| short.iter().zip(&short_behind).map(move |(one, all)| one.beside(all[place].clone()));
     let mut filters: Vec<_> = LowPass::all().enumerate().map(|(place, filter)| (place, filter, 0.0)).collect();
@@ -153,10 +150,7 @@ fn low_passed(measured: &[Statistic]) -> Option<CorrelatedNoise> {
         *missing = missed(&beside(*place).collect::<Vec<_>>());
     }
     filters.sort_by(|a, b| a.2.total_cmp(&b.2));
-    let spectra_of = |one: &Statistic| {
-        let place = (one.half, one.degrees.start);
-        SPECTRA.try_get(place, one.half, || spectra(one).ok_or(()))
-    };
+    let spectra_of = |one: &Statistic| SPECTRA.try_get(one.key(), one.half, || spectra(one).ok_or(()));
     let of_long: Vec<Spectra> = long.iter().map(spectra_of).collect::<Result<_, ()>>().ok()?;
     let longest = of_long.iter().map(|spectra| spectra[0].len()).max().unwrap_or(1);
     let judged = |&(place, filter, _): &(usize, LowPass, f64)| {

@@ -22,7 +22,7 @@ const LEAST_GAIN: f64 = 0.005;
 impl MergedSession<'_, '_, '_> {
     /// By how many samples the torque of every equation seems to be late, and every angle that no equation is of, and the part of itself that such an angle
     /// seems to lack: angles before torques.
-    pub(crate) fn late_channels(
+    pub(crate) fn suspected_channels(
         &mut self,
         fitted: &MergedFit,
         noise: &NoiseOfRows,
@@ -108,13 +108,13 @@ impl MergedSession<'_, '_, '_> {
         let share = 1.0 / (equations as f64).sqrt();
         for (Entry { equation, factor, .. }, coefficient, parameter) in self.entries_of(angle) {
             let factor = self.weights.equations[equation] * factor * parameter;
-            let rate = Multiplied::Motion { channel: angle, coefficient: coefficient - derivative };
+            let derived = Multiplied::Motion { channel: angle, coefficient: coefficient - derivative };
             for (number, trial) in self.trials.iter().enumerate() {
                 let inner = number * equations + equation;
-                for (time, rate) in trial.regressor(rate).value.iter().enumerate() {
+                for (time, derived) in trial.regressor(derived).value.iter().enumerate() {
                     let row = time * group + inner;
                     if row < rows.len() && rows.usable[row] {
-                        value[row] += factor * rate;
+                        value[row] += factor * derived;
                     }
                 }
             }

@@ -93,7 +93,7 @@ impl MergedSession<'_, '_, '_> {
         }
         found.scan = std::mem::take(&mut self.scan);
         found.record_status |= found.scan.status(&found.constants_found());
-        let suspects = self.late_channels(fitted, &noise, &correlated)?;
+        let suspects = self.suspected_channels(fitted, &noise, &correlated)?;
         (found.late, found.lacking) = suspects.into_iter().partition(|(_, suspect)| suspect.missing == Missing::Lag);
         found.lacking.retain(|(_, suspect)| suspect.is_conspicuous());
         let is_late = found.late.iter().any(|(_, late)| late.is_conspicuous());
