@@ -22,9 +22,15 @@ def kernels(half: int, exponent: int, delta: float, shift: float = 0.0) -> Array
     return np.asarray(rows + np.outer(wanted - rows.sum(axis=1), rows[2] / rows[2].sum()))
 
 
+def stride_of(half: int) -> int:
+    """Give the samples from one row to the next: a sixth of the half-width, one more where 5.5 rows to it are left instead of more than eight."""
+    stride = max(1, half // 6)
+    return stride + 1 if half > 8 * stride and half >= 5.5 * (stride + 1) else stride
+
+
 def rows(angle: Array, torque: Array, half: int, exponent: int, delta: float, lag: float = 0.0) -> tuple[Array, Array]:
     """Give the regressors of inertia, damping and stiffness and the right-hand side, NaN where a window does not fit."""
-    stride = max(1, half // 6)
+    stride = stride_of(half)
     kernel = kernels(half, exponent, delta)
     whole = int(np.rint(lag))
     late = kernels(half, exponent, delta, lag - whole)[2]
@@ -43,7 +49,7 @@ def roots(weights: Array, half: int, exponent: int, delta: float, lag: float = 0
     whole = int(np.rint(lag))
     squares = kernels(half, exponent, delta, lag - whole)[2] ** 2
     found = []
-    for centre in range(half, weights.size - half, max(1, half // 6)):
+    for centre in range(half, weights.size - half, stride_of(half)):
         inside = weights[max(0, centre - half + whole) : centre + half + 1 + whole]
         found.append(np.sqrt(squares.sum() / (squares / inside).sum()) if inside.size == squares.size else np.nan)
     return np.array(found)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from parameters import examples
 from reference.noise_correction import Column, Rows, fit, row_covariance, window
-from reference.weak_form import companion_kernels, kernels
+from reference.weak_form import companion_kernels, kernels, stride_of
 from tvident import Status, _core
 
 Array = npt.NDArray[np.float64]
@@ -43,7 +43,7 @@ class Case:
     @property
     def stride(self) -> int:
         """Samples from one row to the next."""
-        return max(1, self.half // 6)
+        return stride_of(self.half)
 
     @property
     def span(self) -> int:
@@ -144,8 +144,8 @@ def case_of(drawn: dict[str, Any], torque_noise: float) -> Case:
     if drawn["masked"]:
         # A gap of half a window, and every seventh sample.
         mask = np.ones(SAMPLES, bool)
-        mask[::7], mask[400 : 400 + drawn["window"] * max(1, drawn["half"] // 6) // 2] = False, False
-    stride = max(1, drawn["half"] // 6)
+        mask[::7], mask[400 : 400 + drawn["window"] * stride_of(drawn["half"]) // 2] = False, False
+    stride = stride_of(drawn["half"])
     return Case(
         angle,
         torque,

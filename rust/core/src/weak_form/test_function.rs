@@ -20,6 +20,10 @@ const LEAST_EXPONENT: usize = 3;
 const MOST_EXPONENT: usize = 20;
 /// The fewest samples on either side of the centre.
 pub(crate) const LEAST_HALF_WIDTH: usize = 4;
+/// Rows to the half-width: about, at most where fewer will do, and the fewest of these, twice as many.
+const ROWS: usize = 6;
+const MANY_ROWS: usize = 8;
+const TWICE_FEWEST_ROWS: usize = 11;
 
 /// A test function on the samples `-h … h`, scaled to a sum of one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,8 +93,9 @@ impl TestFunction {
         (2.0 * self.exponent as f64 * std::f64::consts::LN_2).sqrt() / (2.0 * std::f64::consts::PI * seconds)
     }
 
-    /// Samples from one row to the next that carry all the information of every row: from half their rate on the
-    /// spectrum of `φ″` is below a hundredth of its largest value, for exponents from 5 to 12.
+    /// Samples from one row to the next that carry all the information of every row: a sixth of the half-width in whole samples, and one more where more
+    /// than eight rows to the half-width are left without it and five and a half with it. From half the rate of rows on the power of `φ″` is below 1/5000 of
+    /// its largest value, for exponents from 5 to 12.
     #[must_use]
     pub fn stride(&self) -> usize {
         Self::stride_of(self.half_width)
@@ -98,7 +103,10 @@ impl TestFunction {
 
     /// The same for a half-width.
     pub(crate) fn stride_of(half_width: usize) -> usize {
-        (half_width / 6).max(1)
+        let stride = (half_width / ROWS).max(1);
+        let is_many = half_width > MANY_ROWS * stride;
+        let is_enough = 2 * half_width >= TWICE_FEWEST_ROWS * (stride + 1);
+        stride + usize::from(is_many && is_enough)
     }
 
     /// The kernels for samples that come `shift` sample periods late.
@@ -156,4 +164,35 @@ pub(crate) fn sum(kernel: &[f64]) -> f64 {
     let half = kernel.len() / 2;
     let pairs = kernel[..half].iter().zip(kernel.iter().rev()).map(|(left, right)| left + right);
     pairs.sum::<f64>() + if kernel.len() % 2 == 1 { kernel[half] } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The part of a kernel's largest power that it has at some frequency, in cycles a sample.
+    fn power(kernel: &[f64], frequency: f64) -> f64 {
+        let turn = |place: usize| 2.0 * std::f64::consts::PI * frequency * place as f64;
+        let sum = |part: fn(f64) -> f64| {
+            kernel.iter().enumerate().map(|(place, value)| value * part(turn(place))).sum::<f64>()
+        };
+        sum(f64::cos).powi(2) + sum(f64::sin).powi(2)
+    }
+
+    #[test]
+    fn rows_a_stride_apart_carry_what_every_row_does() {
+        for half in [11, 12, 17, 18, 22, 23, 35, 91] {
+            for exponent in [5, 9, 12] {
+                let function = TestFunction::new(half, exponent, 1.0).expect("a test function");
+                let [accelerated, ..] = function.kernels(0.0).values;
+                let all: Vec<f64> = (0..=500).map(|place| power(&accelerated, place as f64 / 1000.0)).collect();
+                let most = all.iter().copied().fold(0.0, f64::max);
+                let seen = 500 / function.stride();
+                let lost = all[seen + 1..].iter().copied().fold(0.0, f64::max);
+                assert!(lost < most / 5000.0, "{half}, {exponent}: {}", lost / most);
+                let rows = half as f64 / function.stride() as f64;
+                assert!((5.5..=8.0).contains(&rows), "{half}: {rows}");
+            }
+        }
+    }
 }
