@@ -148,6 +148,7 @@ impl MergedSession<'_, '_, '_> {
                 break;
             }
             let before = (std::mem::replace(&mut self.jumps, found), self.parameters.clone());
+            self.fill();
             let Some(again) = self.decide(&fitted.model.clone())? else {
                 // Beside so many jumps nothing is determined.
                 (self.jumps, self.parameters) = before;
