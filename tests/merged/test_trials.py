@@ -152,11 +152,17 @@ def test_a_window_that_there_is_not_is_refused(given: int, bound: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("seed", "at"), [(3025, 3.117), *long((1, 2.5), (2, 2.5), (3, 2.5), (3008, 3.166), (3027, 1.821))]
+    ("seed", "at"),
+    [
+        (3025, 3.117),
+        (3053, 2.776),
+        *long((1, 2.5), (2, 2.5), (3, 2.5), (3008, 3.166), (3027, 1.821), (3006, 1.568), (3029, 2.828)),
+    ],
 )
 def test_steps_of_a_full_endpoint_stiffness_are_followed(seed: int, at: float) -> None:
     # kg, N s/m, N/m: an arm that holds a handle stiffens in every direction. Windows that only the longer side of the step held
     # predicted that side best, and the other side spoke against none: one element of three stayed constant, 7.7 % off.
+    # In three of 36 no jump was found with windows that were at most 1.8 times as long as the shortest (3.16 % off).
     at_rest, step = np.array([[300.0, -80.0], [-80.0, 220.0]]), np.array([[40.0, -40.0], [-40.0, 40.0]])
 
     def stiffness(t: Array) -> Array:

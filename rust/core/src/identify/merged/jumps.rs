@@ -72,8 +72,7 @@ impl MergedSession<'_, '_, '_> {
         let whole = model.problem(whole, &whole.rhs, 1.0, None);
         let rhs = without_constants(&whole, constants);
         let best = fitted.scales.iter().position(|scale| Some(*scale) == fitted.fit.scale).unwrap_or(0);
-        let alone = fitted.scales[best..].iter().filter(|scale| scale.stands_alone());
-        let lengths: Vec<Scale> = alone.step_by(2).take(JUMP_SCALES).copied().collect();
+        let lengths = doubled(&fitted.scales[best..]);
         let search = JumpSearch {
             problem: &rest,
             whole: &whole,
@@ -121,4 +120,16 @@ impl MergedSession<'_, '_, '_> {
         }
         Some(signals)
     }
+}
+
+/// Lengths of windows, each twice the last at least, that jumps are looked for with: many equations at a time make short ones stand alone.
+fn doubled(scales: &[Scale]) -> Vec<Scale> {
+    let mut lengths: Vec<Scale> = Vec::new();
+    for scale in scales.iter().filter(|scale| scale.stands_alone()) {
+        if lengths.last().is_none_or(|last| scale.span() >= 2 * last.span()) {
+            lengths.push(*scale);
+        }
+    }
+    lengths.truncate(JUMP_SCALES);
+    lengths
 }
