@@ -103,7 +103,7 @@ def test_what_a_force_on_one_mass_leaves_open_is_flagged() -> None:
     )
     structure = tvident.Chain(2, [("base", 0), ("base", 1)], base=measured(position, 7))
     found = identify(apart.angle[0], apart.torque[0], structure=structure, **OPTIONS)
-    of_second = ("inertia_1", "damping_base_1", "stiffness_base_1")
+    of_second = ("inertia_1", "damping_base_1", "stiffness_base_1", "offset_1")
     for name in found.elements:
         assert bool(found.identifiable[name]) == (name not in of_second), name
     for name in of_second:
@@ -111,7 +111,7 @@ def test_what_a_force_on_one_mass_leaves_open_is_flagged() -> None:
         assert np.isnan(found.elements[name]).all()
         assert found.kinds[name] == "unknown"
         assert name not in found.constants
-    assert "inertia_1 and 2 more cannot be known" in found.summary().splitlines()[0]
+    assert "inertia_1 and 3 more cannot be known" in found.summary().splitlines()[0]
     assert abs(found.value("stiffness_base_0").value / 12 - 1) < 0.015
     weighed = identify(apart.angle[0], apart.torque[0], structure=structure, inertia={1: 0.03}, **OPTIONS)
     assert all(weighed.identifiable.values())

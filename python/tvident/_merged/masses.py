@@ -79,9 +79,10 @@ class Masses:
     def with_elements(self, asked: AskedTogether, term_values: TermValues) -> tuple[Masses, list[Element]]:
         """Return the masses with all that enters their equations, and the elements, those of terms last.
 
-        There is one a term and mass on which a force acts; a mechanism ties equations to each other, so there it is one a mass.
+        There is one a term and mass whose force is known, zero or not: also where none acts an angle may have another zero, and a bearing
+        rub.
         """
-        given, place, driven, whole = asked.parameters, 0, self.driven, self
+        given, place, whole = asked.parameters, 0, self
         if isinstance(self.structure, Chain):
             found = self.structure.elements(given)
         elif self.structure is None:
@@ -92,9 +93,9 @@ class Masses:
             found = [*rows.elements, *matrices({**dict.fromkeys(COEFFICIENTS, 0.0), **given}, self.count)]
             found = [one for one in found if not one.is_known or one.value]
             whole = replace(self, momenta=rows.momenta, forces=rows.forces, inertia=rows.inertia)
-            place, driven = len(rows.forces), self.measured
+            place = len(rows.forces)
         for name, kind in asked.terms:
-            for mass in driven:
+            for mass in self.measured:
                 found.append(
                     Element(
                         f"{name}_{mass}", name, ((mass, None, place, 1.0),), kind_or_number(name, kind or "constant")

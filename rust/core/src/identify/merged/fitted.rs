@@ -280,6 +280,9 @@ impl MergedSession<'_, '_, '_> {
     fn suspects(&mut self, model: &Model) -> Result<Vec<usize>, Error> {
         let mut left = Vec::new();
         for one in model.constant.clone() {
+            if !self.is_tried(one) {
+                continue;
+            }
             left.extend(self.begin_with(&without(model, one))?.map(|left| (one, left)));
         }
         left.sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -289,6 +292,11 @@ impl MergedSession<'_, '_, '_> {
     /// Whether the record decides what kind an element is of.
     fn is_open(&self, element: usize) -> bool {
         self.merged.elements[element].kind == Kind::Automatic
+    }
+
+    /// Whether a constant is asked whether it changes: not if it stands for zeros of angles in equations without a torque, and was asked for as constant.
+    fn is_tried(&self, element: usize) -> bool {
+        self.is_open(element) || !self.takes_all(element)
     }
 
     /// A fit with tests that rest on what is left, where that is more than the noise of the channels: that may be coloured.
@@ -321,7 +329,7 @@ impl MergedSession<'_, '_, '_> {
         let noise = TestNoise { expected, covariance: &covariance, inflation, from, equations };
         let tests = constancy::test(&problem, &fitted.fit, noise, self.options.instructions, &mut self.stages)?;
         let of_constants = fitted.model.constant.iter().copied().zip(tests);
-        Ok(of_constants.filter_map(|(one, test)| Some((one, test?))).collect())
+        Ok(of_constants.filter(|(one, _)| self.is_tried(*one)).filter_map(|(one, test)| Some((one, test?))).collect())
     }
 }
 

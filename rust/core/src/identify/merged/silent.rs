@@ -73,6 +73,13 @@ impl MergedSession<'_, '_, '_> {
         if most > 1.0 { LESS.powi(steps) * most } else { 1.0 }
     }
 
+    /// Whether an element multiplies no motion and stands in equations alone that any multiple of their parameters satisfies: windows that follow it would
+    /// take whatever else is left there.
+    pub(crate) fn takes_all(&self, element: usize) -> bool {
+        let mut entries = self.merged.elements[element].entries.iter();
+        entries.all(|entry| matches!(entry.of, Multiplied::Term(_)) && self.is_homogeneous(entry.equation))
+    }
+
     /// How many equations stand between a homogeneous one and one with a torque, with this one: those that share an unknown are neighbours.
     fn steps_to_a_torque(&self, equation: usize) -> i32 {
         let share = |one: usize, other: usize| {
