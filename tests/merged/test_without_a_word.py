@@ -333,3 +333,20 @@ def test_the_zero_of_an_angle_is_none_of_the_machine(masses: int, what: str) -> 
             assert found.value(name).value == pytest.approx(true if np.ndim(true) == 0 else np.mean(true), rel=0.01), (
                 name
             )
+
+
+@pytest.mark.parametrize(("driven", "changes"), [(2, 1), *long((2, 0), (0, 2), (1, 1))])
+def test_a_constant_beside_elements_that_are_free_draws_nothing_to_zero(driven: int, changes: int) -> None:
+    # Counting less with every step from a force was for constants alone: springs and inertias of the far masses were zero.
+    values = [12.0, 18.0, 16.0]
+    springs = [constant(value) for value in values]
+    springs[changes] = lambda t: np.asarray(values[changes] * (1 + 0.2 * np.sin(0.9 * t)))
+    simulated = chain(springs, 10000, seed=39, driven=(driven,), angle_noise=3e-5)
+    changing = "stiffness_base_0" if changes == 0 else f"stiffness_{changes - 1}_{changes}"
+    found = identified(simulated, inertia="constant", damping="constant", stiffness={changing: "constant"})
+    for name, true in truth(simulated).items():
+        if not name.startswith("damping"):
+            assert 0.75 < np.nanmean(found.elements[name]) / np.mean(true) < 1.05, name
+    assert found.record_status & Status.KIND_CONTRADICTED
+    assert found.tests[changing] < 5e-4
+    assert not found.trusted.any()

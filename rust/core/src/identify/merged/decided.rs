@@ -40,6 +40,12 @@ impl MergedFit {
         self.scales.len() > 1 && self.fit.scale.is_some() && self.scales.first().copied() == self.fit.scale
     }
 
+    /// The same decisions with the values of another fit of the model.
+    pub(crate) fn with_values_of(self, other: MergedFit) -> Self {
+        let Self { tests, contradicted, jumps, searched, .. } = self;
+        Self { tests, contradicted, jumps, searched, ..other }
+    }
+
     /// Takes tests of its constants; those of what is windowed stand as they were.
     pub(crate) fn take_tests(&mut self, found: Vec<(usize, Test)>) {
         self.contradicted = found.iter().any(|(_, test)| test.probability < constancy::NO_CHANCE);

@@ -163,6 +163,7 @@ impl MergedSession<'_, '_, '_> {
 
     /// Tests what the record decides about, and lets windows follow what is not constant where that predicts better.
     pub(crate) fn decide(&mut self, model: &Model) -> Result<Option<MergedFit>, Error> {
+        self.is_decided = false;
         let Some(mut fitted) = self.fitted(model)? else { return Ok(None) };
         loop {
             let found = self.tests(&fitted, NoiseFrom::Channels)?;
@@ -174,7 +175,8 @@ impl MergedSession<'_, '_, '_> {
             let Some(Freed { one, found, guess }) = self.freed(&fitted, tried, hidden)? else {
                 (self.parameters, self.misfits) = before;
                 self.fill();
-                return self.told_by_what_is_left(fitted).map(Some);
+                let fitted = self.told_by_what_is_left(fitted)?;
+                return self.held_by_torques(fitted).map(Some);
             };
             if !self.is_open(one) {
                 // What it is asked to be stands, and nothing else is to follow what it does.
@@ -184,7 +186,7 @@ impl MergedSession<'_, '_, '_> {
                 let usable = self.all.rows.usable.iter().filter(|usable| **usable).count();
                 let inflation = self.noise_of_rows(&fitted)?.expected.variance_inflation;
                 fitted.contradict(one, &found, usable as f64 / inflation);
-                return Ok(Some(fitted));
+                return self.held_by_torques(fitted).map(Some);
             }
             // Windows were compared with weights of parameters that were wrong while this one was held constant.
             (self.parameters, self.misfits) = guess;

@@ -49,6 +49,7 @@ fn identify_within(
         options,
         noise: [Vec::new(), Vec::new()],
         misfits: Vec::new(),
+        is_decided: false,
         freed: Vec::new(),
         colours: Vec::new(),
         parameters: merged.elements.iter().map(|element| element.known.unwrap_or(0.0)).collect(),

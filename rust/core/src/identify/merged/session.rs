@@ -37,6 +37,8 @@ pub(crate) struct MergedSession<'a, 'b, 'c> {
     pub(crate) noise: [Vec<f64>; 2],
     /// How many times its noise is left of every equation without a torque that is not explained; 1 of others.
     pub(crate) misfits: Vec<f64>,
+    /// Whether nothing more is to be set free.
+    pub(crate) is_decided: bool,
     /// Elements that are windowed although nobody asked for it, since constants leave too much.
     pub(crate) freed: Vec<usize>,
     /// The noise of every angle with its colour.

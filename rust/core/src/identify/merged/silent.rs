@@ -12,6 +12,7 @@
 //! they share.
 
 use crate::error::Error;
+use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::{LEAST_NOISE, MergedSession};
 use crate::identify::merged::system::Multiplied;
 use crate::regression::fit::Fit;
@@ -69,7 +70,8 @@ impl MergedSession<'_, '_, '_> {
         let homogeneous = (0..self.merged.equations()).filter(|&other| self.is_homogeneous(other));
         let most = homogeneous.map(misfit).fold(1.0, f64::max);
         // Where something may be set free, windows are compared on these rows before their equation is explained: they must count.
-        let steps = if self.asks_for_constants() { self.steps_to_a_torque(equation) } else { 1 };
+        let is_decided = self.is_decided || self.asks_for_constants();
+        let steps = if is_decided { self.steps_to_a_torque(equation) } else { 1 };
         if most > 1.0 { LESS.powi(steps) * most } else { 1.0 }
     }
 
@@ -95,6 +97,20 @@ impl MergedSession<'_, '_, '_> {
             steps += 1;
         }
         steps
+    }
+
+    /// A fit with equations that count less for every step to a torque, where one that no torque acts on is wrong and nothing more is to be set
+    /// free that could explain it.
+    pub(crate) fn held_by_torques(&mut self, fitted: MergedFit) -> Result<MergedFit, Error> {
+        let is_far = |equation: usize| self.is_homogeneous(equation) && self.steps_to_a_torque(equation) > 1;
+        let has_far = (0..self.merged.equations()).any(is_far);
+        if self.is_decided || self.asks_for_constants() || !has_far || fitted.misfit <= NOISE_MODEL_FAILS {
+            return Ok(fitted);
+        }
+        self.is_decided = true;
+        self.begin_with(&fitted.model)?;
+        let again = self.fitted(&fitted.model)?;
+        Ok(again.map_or(fitted.clone(), |again| fitted.with_values_of(again)))
     }
 
     /// The mean square of a regressor in the rows of all trials.
