@@ -350,3 +350,24 @@ def test_a_constant_beside_elements_that_are_free_draws_nothing_to_zero(driven: 
     assert found.record_status & Status.KIND_CONTRADICTED
     assert found.tests[changing] < 5e-4
     assert not found.trusted.any()
+
+
+def test_what_a_channel_or_a_kind_contradicts_is_not_trusted() -> None:
+    # All masses are driven, so that nothing is drawn to zero: elements 7 to 14 % off were trusted.
+    springs = [lambda t: np.asarray(12 * (1 + 0.2 * np.sin(0.9 * t))), constant(18.0), constant(16.0)]
+    simulated = chain(springs, 10000, seed=39, driven=(0,), angle_noise=3e-5)
+    found = identified(simulated, **{**CONSTANTS, "stiffness": {"stiffness_base_0": "constant"}})
+    assert found.record_status & Status.KIND_CONTRADICTED
+    assert not found.trusted.any()
+    # A base whose recorder follows with a time constant of 20 ms; as it is, all is well.
+    moved = chain([constant(12.0), constant(18.0)], 10000, seed=3, driven=(1,), base=True)
+    base = np.asarray(moved.base)
+    slow = base.copy()
+    for sample in range(1, slow.size):
+        slow[sample] = slow[sample - 1] + (base[sample] - slow[sample - 1]) / 20
+    identify: Any = tvident.identify
+    for channel, is_trusted in ((base, True), (slow, False)):
+        structure = tvident.Chain(2, [("base", 0), (0, 1)], base=channel)
+        found = identify(moved.angle, moved.torque, structure=structure, sample_rate=1000, dof_axis=0)
+        assert found.trusted.any() == is_trusted
+        assert bool(found.record_status & Status.LAG_SUSPECTED) != is_trusted

@@ -81,7 +81,7 @@ def _channels_of(part: Part, masses: int, period: float) -> list[str]:
     for channel, late in found.late:
         by = f"{abs(late.value):.3g} ± {late.stderr:.1g} samples ({abs(late.value) * period:.3g} s)"
         comes = "late" if late.value > 0 else "early"
-        with_what = "the other channels" if channel < len(angles) else "the angles"
+        with_what = "the other channels, without a filter" if channel < len(angles) else "the angles"
         words.append(
             f"{_named(channel, angles, numbers, masses)} seems to be {comes} by {by}: shift it by as much, or record it with {with_what}"
         )

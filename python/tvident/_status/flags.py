@@ -16,7 +16,8 @@ class Status(enum.IntFlag):
     and say what holds for the whole record: NOISE_MODEL, COLOURED, KIND_CONTRADICTED, WINDOW_LIMIT, LAG_SUSPECTED, TERM_SUSPECTED,
     SCALES_DISAGREE, CHANNEL_SUSPECTED, RANK_DEFICIENT, ILL_CONDITIONED. Three are in both groups: RANK_DEFICIENT and ILL_CONDITIONED are
     flags of the record where they concern its constants, and of a sample where they concern the window around it; NOISE_MODEL is a flag
-    of a sample where it holds outside a mask only, or where much more is left around the sample than elsewhere in the record.
+    of a sample where it holds outside a mask only, or where much more is left around the sample than elsewhere in the record; of several
+    masses or trials of all samples where a channel that is late or whose gain is wrong makes a coefficient another one.
 
     See Also
     --------

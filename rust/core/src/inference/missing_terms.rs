@@ -145,14 +145,27 @@ impl JudgedTerm<'_> {
         Ok(self.factors_and_changes(regressors, stages)?.map(|(factors, _)| factors))
     }
 
+    /// The fit beside regressors: its windowed unknowns, then its constants, those of the regressors last.
+    pub(crate) fn beside(&self, regressors: &[usize], stages: &mut Stages<'_, '_>) -> Result<Option<Fit>, Error> {
+        let model = self.with(regressors);
+        let problem = model.problem(self.rows, self.rhs, self.noise, Some(self.correlated));
+        self.fit.again(&problem, self.expected, self.instructions, stages)
+    }
+
+    /// The model with regressors as further constants.
+    fn with(&self, regressors: &[usize]) -> Model {
+        let mut model = self.model.clone();
+        model.constant.extend(regressors);
+        model
+    }
+
     /// The same, and what each constant of the model changes by with every unit of the last of them.
     pub(crate) fn factors_and_changes(
         &self,
         regressors: &[usize],
         stages: &mut Stages<'_, '_>,
     ) -> Result<Option<FactorsAndChanges>, Error> {
-        let mut model = self.model.clone();
-        model.constant.extend(regressors);
+        let model = self.with(regressors);
         let problem = model.problem(self.rows, self.rhs, self.noise, Some(self.correlated));
         let fit = self.fit.again(&problem, self.expected, self.instructions, stages)?;
         let Some(fit) = fit else { return Ok(None) };

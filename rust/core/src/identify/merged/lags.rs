@@ -11,6 +11,8 @@ use crate::identify::merged::session::MergedSession;
 use crate::identify::merged::shown::NoiseOfRows;
 use crate::identify::merged::system::{Entry, Multiplied};
 use crate::inference::missing_terms::{JudgedTerm, Missing, Suspect};
+use crate::regression::fit::Fit;
+use crate::regression::model::Model;
 use crate::regression::problem::Correlated;
 use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows};
 
@@ -18,6 +20,17 @@ use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows};
 const LEAST_LAG: f64 = 0.05;
 /// A part that such an angle lacks up to which it lacks none.
 const LEAST_GAIN: f64 = 0.005;
+/// So many standard errors, and such a part of itself, an element changes beside a channel that is suspected to be another one.
+const OTHER_BY: f64 = 2.0;
+const OTHER: f64 = 0.02;
+
+/// Channels that are suspected.
+#[derive(Default)]
+pub(crate) struct SuspectedChannels {
+    pub(crate) each: Vec<(usize, Suspect)>,
+    /// The fit beside those that are conspicuous, if any.
+    pub(crate) beside: Option<Fit>,
+}
 
 impl MergedSession<'_, '_, '_> {
     /// By how many samples the torque of every equation seems to be late, and every angle that no equation is of, and the part of itself that such an angle
@@ -27,9 +40,9 @@ impl MergedSession<'_, '_, '_> {
         fitted: &MergedFit,
         noise: &NoiseOfRows,
         correlated: &Arc<Correlated>,
-    ) -> Result<Vec<(usize, Suspect)>, Error> {
+    ) -> Result<SuspectedChannels, Error> {
         if self.merged.trials.iter().any(|trial| trial.position.is_some()) {
-            return Ok(Vec::new());
+            return Ok(SuspectedChannels::default());
         }
         let equations: Vec<usize> = (0..self.merged.equations()).filter(|&one| !self.is_silent(one)).collect();
         let angles: Vec<usize> =
@@ -64,7 +77,6 @@ impl MergedSession<'_, '_, '_> {
             Ok(None) => judged.factors(&each[..equations.len() + angles.len()], &mut self.stages),
             found => found,
         };
-        self.all.rows.regressors.truncate(first);
         let (samples, torques) = (1.0 / self.options.delta, self.merged.channels());
         // A torque stands on the other side of the equation.
         let of_torques = equations.into_iter().map(|equation| (torques + equation, Missing::Lag, -samples));
@@ -75,11 +87,39 @@ impl MergedSession<'_, '_, '_> {
         let found = found.map(|((value, error), (channel, missing, unit))| {
             (channel, Suspect { missing, value: unit * value, error: unit.abs() * error })
         });
-        let is_told = |(channel, suspect): &(usize, Suspect)| {
+        let is_told = |(_, (channel, suspect)): &(usize, (usize, Suspect))| {
             let least = if suspect.missing == Missing::Gain { LEAST_GAIN } else { LEAST_LAG };
             *channel >= torques || suspect.value.abs() > least
         };
-        Ok(found.filter(is_told).collect())
+        let told: Vec<(usize, (usize, Suspect))> = each.into_iter().zip(found).filter(is_told).collect();
+        let conspicuous = told.iter().filter(|(_, (_, suspect))| suspect.is_conspicuous());
+        let conspicuous: Vec<usize> = conspicuous.map(|(column, _)| *column).collect();
+        let beside = if conspicuous.is_empty() { None } else { judged.beside(&conspicuous, &mut self.stages)? };
+        self.all.rows.regressors.truncate(first);
+        Ok(SuspectedChannels { each: told.into_iter().map(|(_, one)| one).collect(), beside })
+    }
+
+    /// Whether coefficients are others in a fit beside channels that are suspected: by more than the errors of windowed ones, by row, and the covariance
+    /// of constants allow.
+    pub(crate) fn are_others(&self, fitted: &MergedFit, beside: &Fit, errors: &[Vec<f64>], covariance: &[f64]) -> bool {
+        let Model { windowed, constant, .. } = &fitted.model;
+        let mean = |errors: &Vec<f64>| {
+            let there = errors.iter().filter(|error| error.is_finite());
+            let (sum, count) = there.fold((0.0, 0.0), |(sum, count), error| (sum + error, count + 1.0));
+            sum / count
+        };
+        let of_windowed =
+            (0..windowed.len()).map(|one| [fitted.fit.median(one), beside.median(one), mean(&errors[one])]);
+        let of_constants = (0..constant.len()).map(|one| {
+            let error = covariance[one * (constant.len() + 1)].max(0.0).sqrt();
+            [fitted.fit.pooled.values[one], beside.pooled.values[one], error]
+        });
+        let each = windowed.iter().chain(constant).zip(of_windowed.chain(of_constants));
+        let is_other = |(&element, [one, other, error]): (&usize, [f64; 3])| {
+            let change = (other - one).abs();
+            self.merged.elements[element].is_of_motion() && change > OTHER_BY * error && change > OTHER * one.abs()
+        };
+        each.into_iter().any(is_other)
     }
 
     /// What an angle is multiplied with: elements, where they appear, and their values about.

@@ -7,14 +7,16 @@ use crate::error::Error;
 use crate::identify::kinds::Kind;
 use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::found::{FoundElement, MergedFound};
+use crate::identify::merged::lags::SuspectedChannels;
 use crate::identify::merged::session::MergedSession;
 use crate::identify::results::{RowResults, SampleResults};
 use crate::identify::scanned::Scan;
-use crate::inference::constancy::NoiseFrom;
+use crate::inference::constancy::{self, NoiseFrom, Test};
 use crate::inference::identifiability::is_mostly_noise;
 use crate::inference::missing_terms::Missing;
 use crate::inference::window_averaging::{Averages, average};
 use crate::regression::constants::{Expected, weakest};
+use crate::regression::fit::Fit;
 use crate::regression::limits::{HARDLY_TOLD_APART, NOISE_MODEL_FAILS};
 use crate::regression::magnitudes::Magnitudes;
 use crate::regression::model::Model;
@@ -59,7 +61,7 @@ impl MergedSession<'_, '_, '_> {
         let weakest = weakest(&fit.full, &fit.pooled.weights);
         let mostly_noise = is_mostly_noise(&problem, rows, model, fit, &weakest, 1.0, &mut self.stages)?;
         let averages = self.averages(fitted, &correlated, noise.expected)?;
-        let AtRows { status, errors, covariances, pairs } = self.at_rows(fitted, &averages, &covariance, inflation);
+        let AtRows { mut status, errors, covariances, pairs } = self.at_rows(fitted, &averages, &covariance, inflation);
         let spread = self.spread(fitted, &averages.values, &noise);
         let count = model.constant.len();
         let kind = |place: usize| if place < model.windowed.len() { Kind::Windowed } else { Kind::Constant };
@@ -79,7 +81,6 @@ impl MergedSession<'_, '_, '_> {
         found.elements.sort_by_key(|one| one.element);
         found.constants.clone_from(&model.constant);
         (found.condition, found.weakest) = (fit.pooled.condition, weakest);
-        (found.covariance, found.pairs) = (covariance, pairs);
         for (holds, flag) in [
             (self.at_end || fitted.has_shortest_windows(), Status::WINDOW_LIMIT),
             (
@@ -93,8 +94,12 @@ impl MergedSession<'_, '_, '_> {
         }
         found.scan = std::mem::take(&mut self.scan);
         found.record_status |= found.scan.status(&found.constants_found());
-        let suspects = self.suspected_channels(fitted, &noise, &correlated)?;
-        (found.late, found.lacking) = suspects.into_iter().partition(|(_, suspect)| suspect.missing == Missing::Lag);
+        let SuspectedChannels { each, beside } = self.suspected_channels(fitted, &noise, &correlated)?;
+        let is_other = |beside: Fit| self.are_others(fitted, &beside, &errors, &covariance);
+        let is_wrong = self.is_contradicted(fitted) || beside.is_some_and(is_other);
+        status.iter_mut().filter(|_| is_wrong).for_each(|status| *status |= Status::NOISE_MODEL.bits());
+        (found.covariance, found.pairs) = (covariance, pairs);
+        (found.late, found.lacking) = each.into_iter().partition(|(_, suspect)| suspect.missing == Missing::Lag);
         found.lacking.retain(|(_, suspect)| suspect.is_conspicuous());
         let is_late = found.late.iter().any(|(_, late)| late.is_conspicuous());
         found.record_status |= if is_late { Status::LAG_SUSPECTED } else { Status::GOOD };
@@ -222,6 +227,15 @@ impl MergedSession<'_, '_, '_> {
         let element = |place: usize| windowed.get(place).copied().unwrap_or_else(|| constant[place - windowed.len()]);
         let pairs = pairs.iter().map(|&(one, other)| (element(one), element(other))).collect();
         AtRows { status, errors, covariances, pairs }
+    }
+
+    /// Whether a coefficient that stays constant differs between parts of the record, beside equations that leave more than noise explains.
+    fn is_contradicted(&self, fitted: &MergedFit) -> bool {
+        let mut of_constants = fitted.tests.iter().filter(|(one, _)| fitted.model.constant.contains(one));
+        let differs = |(one, test): &(usize, Test)| {
+            self.merged.elements[*one].is_of_motion() && test.probability < constancy::NO_CHANCE
+        };
+        fitted.error > NOISE_MODEL_FAILS && of_constants.any(differs)
     }
 
     /// What windows that are as short as can be and yet do not follow leave of every windowed element: rows are predicted worse than noise

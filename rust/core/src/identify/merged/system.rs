@@ -43,6 +43,13 @@ pub struct Element {
     pub kind: Kind,
 }
 
+impl Element {
+    /// Whether it multiplies motion, and is no term.
+    pub(crate) fn is_of_motion(&self) -> bool {
+        self.entries.iter().any(|entry| matches!(entry.of, Multiplied::Motion { .. }))
+    }
+}
+
 /// The channels of one trial, all of the same length.
 #[derive(Clone)]
 pub struct Trial<'a> {
