@@ -48,6 +48,23 @@ def test_less_noise_is_never_worse(converter: bool, torque_snr_db: float) -> Non
         assert error(result.stiffness, rig.stiffness) < STIFFNESS_ERROR
 
 
+@pytest.mark.parametrize(
+    ("seconds", "sample_rate", "seed", "converter"),
+    [(8.0, 2000.0, 6, True), *long((8.0, 1000.0, 8, True))],
+)
+def test_less_noise_is_never_worse_at_any_rate(seconds: float, sample_rate: float, seed: int, converter: bool) -> None:
+    """Spectra ask for test functions too wide for a stiffness that changes."""
+    rig = tvident.simulate_torsional_rig(seconds, sample_rate, seed, angle_noise=0, torque_snr_db=NOISE_FREE)
+    channels = [rounded(one) if converter else one for one in (rig.angle, rig.torque)]
+    result = tvident.identify(*channels, sample_rate=sample_rate)
+    assert result.settings["kinds"]["inertia"] == result.settings["kinds"]["damping"] == "constant"
+    assert result.record_status == 0
+    assert result.jumps == ()
+    assert error(result.inertia, rig.inertia) < CONSTANT_ERROR
+    assert error(result.damping, rig.damping) < CONSTANT_ERROR
+    assert error(result.stiffness, rig.stiffness) < STIFFNESS_ERROR
+
+
 def coloured(kind: str, samples: int, seed: int) -> Array:
     """Return noise of deviation one: autoregressive, or with a density that falls with the frequency."""
     white = np.random.default_rng(seed).standard_normal(samples)

@@ -14,7 +14,7 @@ const CONTRADICTS: f64 = 3.0;
 pub const FEWEST_WIDTHS: usize = 4;
 /// A plateau counts as longer than another from this factor on.
 pub(crate) const LONGER: f64 = 1.05;
-/// How much wider than its narrowest a test function on the plateau is, at most.
+/// How much wider than its narrowest a test function on the plateau is, or narrower than its widest, at most.
 const MARGIN: f64 = 1.5;
 /// A constant is another one than the plateau's beyond so many standard errors of both.
 pub const OTHER_CONSTANT: f64 = 4.0;
@@ -87,9 +87,20 @@ impl Scan {
 
     /// The half-width that is wider than the plateau's narrowest by a margin.
     pub(crate) fn inside(&self) -> Option<usize> {
+        self.nearest_on_plateau(self.narrowest()?.half_width as f64 * self.margin())
+    }
+
+    /// The half-width that is narrower than the plateau's widest by a margin.
+    fn inside_widest(&self) -> Option<usize> {
+        self.nearest_on_plateau(self.widest()? as f64 / self.margin())
+    }
+
+    fn margin(&self) -> f64 {
+        MARGIN.min(self.factor().sqrt())
+    }
+
+    fn nearest_on_plateau(&self, wanted: f64) -> Option<usize> {
         let plateau = self.plateau?;
-        let narrowest = self.scales[plateau.first].half_width as f64;
-        let wanted = narrowest * MARGIN.min(self.factor().sqrt());
         let on = &self.scales[plateau.first..=plateau.last];
         on.iter().map(|one| one.half_width).min_by(|a, b| {
             let off = |half_width: usize| (half_width as f64 / wanted).ln().abs();
@@ -142,6 +153,20 @@ impl Scans {
         self.best.inside()
     }
 
+    /// The same beside windowed unknowns: where one is wider than the whole plateau, a little narrower than its widest. So little noise as asks
+    /// for wide ones says nothing for narrow ones, beside which windows are so short that the noise of the regressors spoils what is constant.
+    pub(crate) fn accepted_beside_windows(&self, half_width: usize) -> Option<usize> {
+        let accepted = self.accepted(half_width)?;
+        let plateau = self.best.accepted_plateau()?;
+        let (place, _) = self.corrected.nearest(half_width)?;
+        if place > plateau.last {
+            return self.best.inside_widest();
+        }
+        // Wider than those that agree with the correction, and on the plateau without it.
+        let is_wider = self.corrected.accepted_plateau().is_some_and(|own| place > own.last) && half_width > accepted;
+        Some(accepted).filter(|_| !is_wider || self.contradict(half_width))
+    }
+
     /// Whether a half-width, corrected for noise, contradicts the plateau.
     pub(crate) fn contradict(&self, half_width: usize) -> bool {
         let (Some(accepted), Some((place, chosen))) = (self.best.narrowest(), self.corrected.nearest(half_width))
@@ -168,6 +193,38 @@ mod tests {
         let mut scan = Scan { tried: widths, scales: (0..widths).map(at).collect(), ..Scan::default() };
         scan.find_plateau();
         scan
+    }
+
+    /// Half-widths of 4, 8, 16 … 4096, of which some ranges agree.
+    fn with_plateau(holds: std::ops::RangeInclusive<usize>) -> Scan {
+        let mut scan = scan(1.0, 0.01, 11);
+        for (place, scale) in scan.scales.iter_mut().enumerate().filter(|(place, _)| !holds.contains(place)) {
+            scale.values[0] = 2.0 + place as f64;
+        }
+        scan.find_plateau();
+        scan
+    }
+
+    #[test]
+    fn a_width_off_the_plateau_gives_way_to_its_narrow_end_and_beside_windows_to_the_nearer_one() {
+        let scans = Scans { best: with_plateau(3..=7), corrected: with_plateau(3..=7) };
+        assert_eq!([64, 8, 2048].map(|half| scans.accepted(half)), [None, Some(64), Some(64)]);
+        assert_eq!([64, 8, 2048].map(|half| scans.accepted_beside_windows(half)), [None, Some(64), Some(256)]);
+    }
+
+    #[test]
+    fn beside_windows_a_width_that_agrees_stays_where_it_is_wider_than_the_plateau_with_the_correction() {
+        let mut scans = Scans { best: with_plateau(1..=9), corrected: with_plateau(1..=6) };
+        assert!(scans.contradict(1024));
+        assert_eq!(scans.accepted_beside_windows(1024), Some(16));
+        scans.corrected.scales[8].values[0] = 1.025;
+        assert_eq!(scans.accepted_beside_windows(1024), None);
+        assert_eq!(scans.accepted(1024), Some(16));
+        // Not at the narrow end of the other.
+        scans.best = with_plateau(6..=10);
+        assert_eq!(scans.accepted_beside_windows(1024), None);
+        scans.best = with_plateau(8..=10);
+        assert_eq!(scans.accepted_beside_windows(1024), Some(2048));
     }
 
     #[test]

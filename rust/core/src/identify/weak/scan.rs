@@ -43,7 +43,13 @@ impl Session<'_, '_, '_> {
             None => scans.insert(self.scan(model, chosen.weak.function.half_width())?),
         };
         let before = chosen.weak.function.half_width();
-        let moved = if given { None } else { scans.accepted(before) };
+        let moved = if given {
+            None
+        } else if model.windowed.is_empty() {
+            scans.accepted(before)
+        } else {
+            scans.accepted_beside_windows(before)
+        };
         let half_width = moved.unwrap_or(before);
         self.scan = scans.best.clone();
         let mut chosen = if half_width == before { chosen } else { self.chosen_with(half_width, model)? };
