@@ -235,6 +235,16 @@ impl WeakRows {
         }
     }
 
+    /// The mean square of the largest torque: the recorded one, or that of inertia, damping or stiffness by itself, without what noise of some
+    /// variance makes of it.
+    pub(crate) fn largest_torque(&self, parameters: [f64; 3], variance: f64) -> f64 {
+        let noise = |index: usize| self.rows.regressors[index].noise[0].iter().map(|value| value * value).sum::<f64>();
+        let of = |(index, parameter): (usize, f64)| {
+            parameter.powi(2) * (self.rows.mean_square_of(index) - variance * noise(index)).max(0.0)
+        };
+        parameters.into_iter().enumerate().map(of).fold(self.rows.mean_square(), f64::max)
+    }
+
     /// Whether windows of so many rows are hardly longer than the test function: they follow anything as if it were motion.
     pub(crate) fn follow_anything(&self, rows: usize) -> bool {
         rows * self.stride < SHORT * self.function.window_length()

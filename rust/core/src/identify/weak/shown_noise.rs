@@ -18,7 +18,7 @@ use crate::noise::coherence::{CORRELATED_NOISE, noise_coherence};
 use crate::noise::low_passed::density_above_motion;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
-use crate::regression::limits::UNEXPLAINED;
+use crate::regression::limits::{LITTLE, UNEXPLAINED};
 use crate::regression::model::Model;
 use crate::regression::problem::Problem;
 use crate::regression::residuals::{residuals, usual_variance};
@@ -35,8 +35,6 @@ const ROUNDS: usize = 3;
 /// Steps towards the noise that one test function shows, and the part of it that the last may change it by.
 const STEPS: usize = 4;
 const SETTLED: f64 = 0.1;
-/// The part of the torque's mean square that windows hardly longer than the test function may leave: they follow anything.
-const LEFT_BY_SHORT: f64 = 1e-5;
 /// Rows over which what is left is correlated, in reaches of a test function: where two share no sample noise of the channels may last.
 pub(crate) const REACHES: usize = 4;
 /// Parts of a record with constants of their own: what varies over the record is not noise.
@@ -170,12 +168,16 @@ impl Session<'_, '_, '_> {
     }
 
     /// Whether so much is left of the equations that they are wrong rather than noisy: a term is missing, or the torque is late. Windows hardly
-    /// longer than the test function follow what is wrong as if it were motion: they must leave next to nothing. What a low-passed torque shows
-    /// above the motion is noise, however much it is.
+    /// longer than the test function follow what is wrong as if it were motion: they must leave little of the largest torque, that of a spring and
+    /// a mass that swing against each other, as a stiffness that bends within windows does. What a low-passed torque shows above the motion is
+    /// noise, however much it is.
     fn is_no_noise(&mut self, chosen: &mut Chosen, model: &Model) -> Result<bool, Error> {
         let fitted = self.take_fitted(chosen, model)?;
-        let most = if fitted.has_windows_of_a_function(&chosen.weak) { LEFT_BY_SHORT } else { UNEXPLAINED };
-        let is_more = fitted.expected.torque > most * chosen.weak.rows.mean_square();
+        let mut most = UNEXPLAINED * chosen.weak.rows.mean_square();
+        if fitted.has_windows_of_a_function(&chosen.weak) {
+            most = most.min(LITTLE * chosen.weak.largest_torque(chosen.parameters, self.noise[0]));
+        }
+        let is_more = fitted.expected.torque > most;
         chosen.fitted = Some(fitted);
         Ok(is_more && self.noise[1] > MORE * self.density_above_motion())
     }

@@ -6,7 +6,7 @@ use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
-use crate::regression::limits::{NEGLIGIBLE, NOISE_MODEL_FAILS, UNEXPLAINED};
+use crate::regression::limits::{LITTLE, NEGLIGIBLE, NOISE_MODEL_FAILS, UNEXPLAINED};
 use crate::regression::row_covariance::RowCovariance;
 use crate::status::Status;
 use crate::weak_form::weak_rows::WeakRows;
@@ -36,6 +36,12 @@ impl Errors {
     pub(crate) fn is_explained(&self, rows: &Rows) -> bool {
         self.left <= NEGLIGIBLE * rows.mean_square()
     }
+
+    /// Whether next to nothing is left of the largest torque, and little of the one that was recorded. Near a resonance the torques of spring and mass
+    /// are far larger than the drive's: a part of them that no window follows is more of the drive's, and correlated.
+    fn is_explained_beside_motion(&self, rows: &Rows, largest: f64) -> bool {
+        self.left <= (NEGLIGIBLE * largest).min(LITTLE * rows.mean_square())
+    }
 }
 
 impl Session<'_, '_, '_> {
@@ -61,10 +67,12 @@ impl Session<'_, '_, '_> {
         let raised = self.raised(weak, decided);
         let matters = errors.left > UNEXPLAINED * weak.rows.mean_square();
         errors.over_channels = errors.error * raised;
-        if coloured && !errors.is_explained(&weak.rows) {
+        let is_explained = errors.is_explained(&weak.rows);
+        let largest = weak.largest_torque(self.parameters(&decided.model, fit), self.noise[0]);
+        if coloured && !is_explained && !errors.is_explained_beside_motion(&weak.rows, largest) {
             errors.status |= Status::COLOURED;
         }
-        if fails || matters && errors.over_channels > NOISE_MODEL_FAILS {
+        if fails && !is_explained || matters && errors.over_channels > NOISE_MODEL_FAILS {
             errors.status |= Status::NOISE_MODEL;
         }
         if fails || raised > RAISED {
