@@ -23,7 +23,7 @@ def kernels(half: int, exponent: int, delta: float, shift: float = 0.0) -> Array
 
 
 def stride_of(half: int) -> int:
-    """Give the samples from one row to the next: a sixth of the half-width, one more where 5.5 rows to it are left instead of more than eight."""
+    """Give the samples from one row to the next: a sixth of the half-width, or one more instead of more than eight rows to it."""
     stride = max(1, half // 6)
     return stride + 1 if half > 8 * stride and half >= 5.5 * (stride + 1) else stride
 

@@ -185,7 +185,7 @@ mod tests {
             for exponent in [5, 9, 12] {
                 let function = TestFunction::new(half, exponent, 1.0).expect("a test function");
                 let [accelerated, ..] = function.kernels(0.0).values;
-                let all: Vec<f64> = (0..=500).map(|place| power(&accelerated, place as f64 / 1000.0)).collect();
+                let all: Vec<f64> = (0..=500).map(|place| power(&accelerated, f64::from(place) / 1000.0)).collect();
                 let most = all.iter().copied().fold(0.0, f64::max);
                 let seen = 500 / function.stride();
                 let lost = all[seen + 1..].iter().copied().fold(0.0, f64::max);
