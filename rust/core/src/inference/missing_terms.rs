@@ -15,7 +15,7 @@ use crate::record::samples::Samples;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
-use crate::regression::problem::Correlated;
+use crate::regression::problem::{Correlated, Problem};
 use crate::regression::row_covariance::RowCovariance;
 use crate::simd::instructions::Instructions;
 
@@ -145,18 +145,17 @@ impl JudgedTerm<'_> {
         Ok(self.factors_and_changes(regressors, stages)?.map(|(factors, _)| factors))
     }
 
-    /// The fit beside regressors: its windowed unknowns, then its constants, those of the regressors last.
-    pub(crate) fn beside(&self, regressors: &[usize], stages: &mut Stages<'_, '_>) -> Result<Option<Fit>, Error> {
-        let model = self.with(regressors);
-        let problem = model.problem(self.rows, self.rhs, self.noise, Some(self.correlated));
-        self.fit.again(&problem, self.expected, self.instructions, stages)
-    }
-
-    /// The model with regressors as further constants.
-    fn with(&self, regressors: &[usize]) -> Model {
+    /// The problem with regressors as further constants, which are the last, and its fit, or `None` if these are not determined.
+    pub(crate) fn beside(
+        &self,
+        regressors: &[usize],
+        stages: &mut Stages<'_, '_>,
+    ) -> Result<Option<(Problem<'_>, Fit)>, Error> {
         let mut model = self.model.clone();
         model.constant.extend(regressors);
-        model
+        let problem = model.problem(self.rows, self.rhs, self.noise, Some(self.correlated));
+        let fit = self.fit.again(&problem, self.expected, self.instructions, stages)?;
+        Ok(fit.map(|fit| (problem, fit)))
     }
 
     /// The same, and what each constant of the model changes by with every unit of the last of them.
@@ -165,10 +164,7 @@ impl JudgedTerm<'_> {
         regressors: &[usize],
         stages: &mut Stages<'_, '_>,
     ) -> Result<Option<FactorsAndChanges>, Error> {
-        let model = self.with(regressors);
-        let problem = model.problem(self.rows, self.rhs, self.noise, Some(self.correlated));
-        let fit = self.fit.again(&problem, self.expected, self.instructions, stages)?;
-        let Some(fit) = fit else { return Ok(None) };
+        let Some((problem, fit)) = self.beside(regressors, stages)? else { return Ok(None) };
         let (known, count) = (self.model.constant.len(), problem.layout.constant);
         let factor = |constant: usize| {
             let variance = self.inflation * fit.variance_of(&problem, constant, self.covariance, stages)?;

@@ -170,7 +170,7 @@ pub(crate) fn sum(kernel: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// The part of a kernel's largest power that it has at some frequency, in cycles a sample.
+    /// The power of a kernel at some frequency, in cycles a sample.
     fn power(kernel: &[f64], frequency: f64) -> f64 {
         let turn = |place: usize| 2.0 * std::f64::consts::PI * frequency * place as f64;
         let sum = |part: fn(f64) -> f64| {

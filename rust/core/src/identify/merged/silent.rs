@@ -70,9 +70,13 @@ impl MergedSession<'_, '_, '_> {
         let homogeneous = (0..self.merged.equations()).filter(|&other| self.is_homogeneous(other));
         let most = homogeneous.map(misfit).fold(1.0, f64::max);
         // Where something may be set free, windows are compared on these rows before their equation is explained: they must count.
-        let is_decided = self.is_decided || self.asks_for_constants();
-        let steps = if is_decided { self.steps_to_a_torque(equation) } else { 1 };
+        let steps = if self.is_held_by_torques() { self.steps_to_a_torque(equation) } else { 1 };
         if most > 1.0 { LESS.powi(steps) * most } else { 1.0 }
+    }
+
+    /// Whether nothing is to be set free, so that equations may count less for every step to a torque.
+    fn is_held_by_torques(&self) -> bool {
+        self.is_decided || self.asks_for_constants()
     }
 
     /// Whether an element multiplies no motion and stands in equations alone that any multiple of their parameters satisfies: windows that follow it would
@@ -103,14 +107,16 @@ impl MergedSession<'_, '_, '_> {
     /// free that could explain it.
     pub(crate) fn held_by_torques(&mut self, fitted: MergedFit) -> Result<MergedFit, Error> {
         let is_far = |equation: usize| self.is_homogeneous(equation) && self.steps_to_a_torque(equation) > 1;
-        let has_far = (0..self.merged.equations()).any(is_far);
-        if self.is_decided || self.asks_for_constants() || !has_far || fitted.misfit <= NOISE_MODEL_FAILS {
+        let is_right = fitted.misfit <= NOISE_MODEL_FAILS;
+        if self.is_held_by_torques() || is_right || !(0..self.merged.equations()).any(is_far) {
             return Ok(fitted);
         }
         self.is_decided = true;
         self.begin_with(&fitted.model)?;
-        let again = self.fitted(&fitted.model)?;
-        Ok(again.map_or(fitted.clone(), |again| fitted.with_values_of(again)))
+        Ok(match self.fitted(&fitted.model)? {
+            Some(again) => fitted.with_values_of(again),
+            None => fitted,
+        })
     }
 
     /// The mean square of a regressor in the rows of all trials.

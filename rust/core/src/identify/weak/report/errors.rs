@@ -67,12 +67,11 @@ impl Session<'_, '_, '_> {
         let raised = self.raised(weak, decided);
         let matters = errors.left > UNEXPLAINED * weak.rows.mean_square();
         errors.over_channels = errors.error * raised;
-        let is_explained = errors.is_explained(&weak.rows);
-        let largest = weak.largest_torque(self.parameters(&decided.model, fit), self.noise[0]);
-        if coloured && !is_explained && !errors.is_explained_beside_motion(&weak.rows, largest) {
+        let largest = || weak.largest_torque(self.parameters(&decided.model, fit), self.noise[0]);
+        if coloured && !errors.is_explained_beside_motion(&weak.rows, largest()) {
             errors.status |= Status::COLOURED;
         }
-        if fails && !is_explained || matters && errors.over_channels > NOISE_MODEL_FAILS {
+        if fails && !errors.is_explained(&weak.rows) || matters && errors.over_channels > NOISE_MODEL_FAILS {
             errors.status |= Status::NOISE_MODEL;
         }
         if fails || raised > RAISED {
