@@ -19,9 +19,9 @@ use crate::error::Error;
 use crate::exec::memory;
 
 /// The calling thread calls the watch at least this often.
-const WATCH: Duration = Duration::from_millis(50);
+const WATCH: Duration = Duration::from_millis(20);
 
-/// Called on the calling thread, at least every 50 ms and at the end, with the work done so far and all of it. Returning `false`
+/// Called on the calling thread, at least every 20 ms and at the end, with the work done so far and all of it. Returning `false`
 /// cancels what is left.
 pub type Watch<'a> = dyn FnMut(usize, usize) -> bool + 'a;
 
@@ -55,7 +55,7 @@ pub(crate) fn run<P: Send, S>(
     run_long(pieces, workers, scratch, |piece, scratch, _| work(piece, scratch), watch)
 }
 
-/// The same for pieces that may take longer than 50 ms and therefore ask whether to go on.
+/// The same for pieces that may take longer than 20 ms and therefore ask whether to go on.
 pub(crate) fn run_long<P: Send, S>(
     pieces: Vec<Piece<P>>,
     workers: NonZeroUsize,

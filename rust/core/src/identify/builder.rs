@@ -231,7 +231,7 @@ impl<'a> Identify<'a> {
         self.run_watched(&mut |_, _| true)
     }
 
-    /// Makes the call and tells a watch, at least every 50 ms, how much is done; it may cancel.
+    /// Makes the call and tells a watch, at least every 20 ms, how much is done; it may cancel.
     ///
     /// # Errors
     /// As [`Identify::run`], and if the watch cancels.

@@ -10,6 +10,7 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
+use crate::exec::pool::GoOn;
 use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::estimates::Estimates;
 use crate::local_polynomials::off_centre::{Evaluated, OffCentre, Tabulate, Top};
@@ -52,6 +53,18 @@ pub(crate) struct Ends {
 /// A table of the polynomials that is kept has at most so many numbers: 1 MB.
 const LARGEST_TABLE: usize = 1 << 17;
 
+/// After so many groups of samples it is asked whether to go on: a group takes about a microsecond.
+const ASKED: usize = 1 << 12;
+
+/// Samples at one end of a record, and what is wanted of them.
+pub(crate) struct Edge<'a> {
+    pub(crate) end: End,
+    pub(crate) samples: Range<usize>,
+    pub(crate) wanted: Wanted,
+    /// Half a window of millions of samples takes long.
+    pub(crate) go_on: &'a GoOn<'a>,
+}
+
 /// The first sample of the window at an end.
 fn first_window(basis: &Basis, samples: usize, end: End) -> usize {
     match end {
@@ -82,24 +95,21 @@ impl Ends {
         Some(shares.filter(|(_, share)| *share > 0.0).collect())
     }
 
-    /// Writes what is wanted of the given samples, all of them at one end of the record. `orders` are those that share in the window
-    /// there and their shares, where it does not choose for itself.
-    #[allow(clippy::too_many_arguments, reason = "which samples of which record, and where they go")]
+    /// Writes what is wanted of some samples at one end of the record. `orders` are those that share in the window there and their shares,
+    /// where it does not choose for itself.
     pub(crate) fn estimate(
         &self,
         basis: &Basis,
         record: &dyn Samples,
-        end: End,
+        edge: &Edge<'_>,
         orders: Option<Vec<(usize, f64)>>,
-        samples: Range<usize>,
-        wanted: Wanted,
         estimates: &mut Estimates<'_>,
     ) {
-        let first = first_window(basis, record.len(), end);
+        let first = first_window(basis, record.len(), edge.end);
         let mut window = vec![0.0; basis.length()];
         record.read(first, &mut window);
         let window = Window::project(basis, &window, self.floor);
-        self.write(basis, window, (end, first), orders, samples, wanted, estimates);
+        self.write(basis, (window, first), edge, orders, estimates);
     }
 
     /// Writes the derivatives of several records at some samples, all of them at one end, so many elements a record.
@@ -117,24 +127,21 @@ impl Ends {
         for (record, window) in windows.into_iter().take(records.count()).enumerate() {
             let usable = records.unusable(record, first..first + basis.length()).next().is_none();
             let mut own = estimates.part(record * elements..(record + 1) * elements);
-            let (window, wanted) = (usable.then_some(window), Wanted::Derivatives);
-            self.write(basis, window, (end, first), None, samples.clone(), wanted, &mut own);
+            let edge = Edge { end, samples: samples.clone(), wanted: Wanted::Derivatives, go_on: &|| true };
+            self.write(basis, (usable.then_some(window), first), &edge, None, &mut own);
         }
     }
 
     /// Writes what the window at an end, with its first sample, says of some samples.
-    #[allow(clippy::too_many_arguments, reason = "which samples of which window, and where they go")]
     fn write(
         &self,
         basis: &Basis,
-        window: Option<Window>,
-        (end, first): (End, usize),
+        (window, first): (Option<Window>, usize),
+        edge: &Edge<'_>,
         orders: Option<Vec<(usize, f64)>>,
-        samples: Range<usize>,
-        wanted: Wanted,
         estimates: &mut Estimates<'_>,
     ) {
-        let elements = estimates.elements.of(samples);
+        let elements = estimates.elements.of(edge.samples.clone());
         let Some(window) = window else {
             for element in elements {
                 estimates.nothing(element);
@@ -142,7 +149,7 @@ impl Ends {
             return;
         };
         let fit = self.fit(window, basis.length(), orders);
-        self.evaluate(basis, (end, &fit), first, elements.clone(), wanted, estimates);
+        self.evaluate(basis, (&fit, first), edge, elements.clone(), estimates);
         for element in elements {
             estimates.diagnose(element, fit.order, Status::EDGE | fit.status, fit.sigma);
         }
@@ -162,10 +169,9 @@ impl Ends {
     fn evaluate(
         &self,
         basis: &Basis,
-        (end, fit): (End, &BoundaryFit),
-        begin: usize,
+        (fit, begin): (&BoundaryFit, usize),
+        &Edge { end, wanted, go_on, .. }: &Edge<'_>,
         elements: Range<usize>,
-        wanted: Wanted,
         estimates: &mut Estimates<'_>,
     ) {
         let (lanes, numbers) = (self.instructions.lanes(), self.numbers(basis));
@@ -185,6 +191,9 @@ impl Ends {
         let mut first = elements.start;
         while first < elements.end {
             let group = outward(first) / lanes;
+            if (first == elements.start || group.is_multiple_of(ASKED)) && !go_on() {
+                return;
+            }
             let within = group * lanes..(group + 1) * lanes;
             let table = if let Some(table) = table {
                 &table[group * numbers..][..numbers]

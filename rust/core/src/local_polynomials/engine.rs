@@ -9,6 +9,8 @@
 use std::fmt::Debug;
 use std::ops::Range;
 
+use crate::error::Error;
+use crate::exec::pool::Watch;
 use crate::lanes::interleaved::Strips;
 use crate::lanes::output::Outputs;
 use crate::lanes::store::{Records, Write};
@@ -62,17 +64,26 @@ pub(crate) trait Walk: Debug + Send + Sync {
 }
 
 /// The engine with the smallest kernels that hold a basis, which follow the residual or do not.
-pub(crate) fn engine(basis: &Basis, finish: Finish, residual: bool, instructions: Instructions) -> Box<dyn Walk> {
-    match (residual, basis.degrees()) {
-        (true, ..=8) => Box::new(Engine::<8, true>::new(basis, finish, instructions)),
-        (true, _) => Box::new(Engine::<16, true>::new(basis, finish, instructions)),
-        (false, ..=4) => Box::new(Engine::<4, false>::new(basis, finish, instructions)),
-        (false, ..=6) => Box::new(Engine::<6, false>::new(basis, finish, instructions)),
-        (false, ..=8) => Box::new(Engine::<8, false>::new(basis, finish, instructions)),
-        (false, ..=12) => Box::new(Engine::<12, false>::new(basis, finish, instructions)),
-        (false, ..=16) => Box::new(Engine::<16, false>::new(basis, finish, instructions)),
-        (false, _) => Box::new(Engine::<20, false>::new(basis, finish, instructions)),
-    }
+///
+/// # Errors
+/// If the watch cancels.
+pub(crate) fn engine(
+    basis: &Basis,
+    finish: Finish,
+    residual: bool,
+    instructions: Instructions,
+    watch: &mut Watch<'_>,
+) -> Result<Box<dyn Walk>, Error> {
+    Ok(match (residual, basis.degrees()) {
+        (true, ..=8) => Box::new(Engine::<8, true>::new(basis, finish, instructions, watch)?),
+        (true, _) => Box::new(Engine::<16, true>::new(basis, finish, instructions, watch)?),
+        (false, ..=4) => Box::new(Engine::<4, false>::new(basis, finish, instructions, watch)?),
+        (false, ..=6) => Box::new(Engine::<6, false>::new(basis, finish, instructions, watch)?),
+        (false, ..=8) => Box::new(Engine::<8, false>::new(basis, finish, instructions, watch)?),
+        (false, ..=12) => Box::new(Engine::<12, false>::new(basis, finish, instructions, watch)?),
+        (false, ..=16) => Box::new(Engine::<16, false>::new(basis, finish, instructions, watch)?),
+        (false, _) => Box::new(Engine::<20, false>::new(basis, finish, instructions, watch)?),
+    })
 }
 
 /// Plan of the walk with kernels of `D` degrees, which follow the residual or do not.
@@ -107,8 +118,8 @@ struct States {
 }
 
 impl<const D: usize, const RESIDUAL: bool> Engine<D, RESIDUAL> {
-    pub(crate) fn new(basis: &Basis, finish: Finish, instructions: Instructions) -> Self {
-        Self { projection: Projection::new(basis), finish, instructions }
+    fn new(basis: &Basis, finish: Finish, instructions: Instructions, watch: &mut Watch<'_>) -> Result<Self, Error> {
+        Ok(Self { projection: Projection::watched(basis, watch)?, finish, instructions })
     }
 
     /// Whether every `step`-th window is projected on its own.

@@ -9,9 +9,9 @@ use std::sync::OnceLock;
 
 use crate::error::Error;
 use crate::exec::memory;
-use crate::exec::pool::Watch;
+use crate::exec::pool::{GoOn, Watch};
 use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
-use crate::local_polynomials::boundary::{End, Ends};
+use crate::local_polynomials::boundary::{Edge, End, Ends};
 use crate::local_polynomials::criterion::Criterion;
 use crate::local_polynomials::engine::{Walk, engine};
 use crate::local_polynomials::estimates::Estimates;
@@ -88,7 +88,7 @@ impl LocalPolynomials {
         memory::ask_for_numbers(window_length.saturating_mul(MOST_DEGREES))?;
         let basis = Basis::watched(window_length, degrees, watch)?;
         let residual = options.noise || matches!(options.order, Order::Chosen { .. });
-        let engine = engine(&basis, Finish::new(&options, &basis), residual, options.instructions);
+        let engine = engine(&basis, Finish::new(&options, &basis), residual, options.instructions, watch)?;
         let ends = Ends::new(&options, &basis);
         Ok(Self { options, basis, ends, engine, selector: OnceLock::new() })
     }
@@ -177,7 +177,7 @@ impl LocalPolynomials {
         estimates: &mut Estimates<'_>,
         scratch: &mut PolynomialScratch,
     ) -> Result<(), Error> {
-        self.everywhere(record, samples, Wanted::Errors, estimates, scratch)
+        self.everywhere(record, samples, (Wanted::Errors, &|| true), estimates, scratch)
     }
 
     /// Memory for one thread that computes standard errors.
@@ -201,7 +201,7 @@ impl LocalPolynomials {
         estimates: &mut Estimates<'_>,
         scratch: &mut PolynomialScratch,
     ) -> Result<(), Error> {
-        self.everywhere(record, samples, Wanted::Derivatives, estimates, scratch)
+        self.everywhere(record, samples, (Wanted::Derivatives, &|| true), estimates, scratch)
     }
 
     /// The same for samples whose full window lies in the record: those from [`LocalPolynomials::before_centre`] on, as many as the
@@ -225,11 +225,12 @@ impl LocalPolynomials {
         Ok(())
     }
 
+    /// Asks repeatedly whether to go on; after `false` what was estimated is incomplete.
     pub(crate) fn everywhere(
         &self,
         record: &dyn Samples,
         samples: Range<usize>,
-        wanted: Wanted,
+        (wanted, go_on): (Wanted, &GoOn<'_>),
         estimates: &mut Estimates<'_>,
         scratch: &mut PolynomialScratch,
     ) -> Result<(), Error> {
@@ -237,17 +238,17 @@ impl LocalPolynomials {
         let (start, end) = (half, record.len() - half);
         if samples.start < start {
             let orders = self.orders_at(record, 0, scratch);
-            let edge = samples.start..samples.end.min(start);
-            self.ends.estimate(&self.basis, record, End::First, orders, edge, wanted, estimates);
+            let edge = Edge { end: End::First, samples: samples.start..samples.end.min(start), wanted, go_on };
+            self.ends.estimate(&self.basis, record, &edge, orders, estimates);
         }
         let interior = samples.start.max(start)..samples.end.min(end);
-        if !interior.is_empty() {
+        if !interior.is_empty() && go_on() {
             self.centred(record, interior, wanted, estimates, scratch);
         }
-        if samples.end > end {
+        if samples.end > end && go_on() {
             let orders = self.orders_at(record, windows - 1, scratch);
-            let edge = samples.start.max(end)..samples.end;
-            self.ends.estimate(&self.basis, record, End::Last, orders, edge, wanted, estimates);
+            let edge = Edge { end: End::Last, samples: samples.start.max(end)..samples.end, wanted, go_on };
+            self.ends.estimate(&self.basis, record, &edge, orders, estimates);
         }
         Ok(())
     }

@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::ops::Range;
 
 use crate::error::Error;
-use crate::exec::pool::{self, Piece, Watch};
+use crate::exec::pool::{self, GoOn, Piece, Watch};
 use crate::local_polynomials::boundary::End;
 use crate::local_polynomials::estimates::Estimates;
 use crate::local_polynomials::order_shares::{Selector, Wanted};
@@ -51,10 +51,12 @@ impl LocalPolynomials {
         workers: NonZeroUsize,
         watch: &mut Watch<'_>,
     ) -> Result<(), Error> {
-        let work = |part: PartOfRecords<'_, '_>, scratch: &mut PolynomialScratch| {
+        let work = |part: PartOfRecords<'_, '_>, scratch: &mut PolynomialScratch, go_on: &GoOn<'_>| {
             let PartOfRecords { records, samples, elements, mut estimates } = part;
             let outcome = match records {
-                [record] if ends => self.estimate(*record, samples, &mut estimates, scratch),
+                [record] if ends => {
+                    self.everywhere(*record, samples, (Wanted::Derivatives, go_on), &mut estimates, scratch)
+                }
                 [record] => self.estimate_centred(*record, samples, &mut estimates, scratch),
                 _ => self.side_by_side(records, ends, elements, &mut estimates, scratch),
             };
@@ -62,7 +64,7 @@ impl LocalPolynomials {
         };
         let pieces = self.pieces(records, estimates, ends, part, Wanted::Derivatives)?;
         self.ask_for_scratch(Wanted::Derivatives, workers.get().min(pieces.len()))?;
-        pool::run(pieces, workers, || self.scratch(), work, watch)
+        pool::run_long(pieces, workers, || self.scratch(), work, watch)
     }
 
     /// Estimates at all samples of a few records, side by side.
@@ -127,16 +129,16 @@ impl LocalPolynomials {
         workers: NonZeroUsize,
         watch: &mut Watch<'_>,
     ) -> Result<(), Error> {
-        let work = |mut part: PartOfRecords<'_, '_>, scratch: &mut PolynomialScratch| {
+        let work = |mut part: PartOfRecords<'_, '_>, scratch: &mut PolynomialScratch, go_on: &GoOn<'_>| {
             for record in part.records {
                 let (samples, estimates) = (part.samples.clone(), &mut part.estimates);
-                let outcome = self.everywhere(*record, samples, Wanted::Errors, estimates, scratch);
+                let outcome = self.everywhere(*record, samples, (Wanted::Errors, go_on), estimates, scratch);
                 debug_assert_eq!(outcome, Ok(()), "the lengths of all records were checked");
             }
         };
         let pieces = self.pieces(records, estimates, true, part, Wanted::Errors)?;
         self.ask_for_scratch(Wanted::Errors, workers.get().min(pieces.len()))?;
-        pool::run(pieces, workers, || self.scratch_for(Wanted::Errors), work, watch)
+        pool::run_long(pieces, workers, || self.scratch_for(Wanted::Errors), work, watch)
     }
 
     /// Cuts records into pieces of work.

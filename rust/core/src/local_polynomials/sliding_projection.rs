@@ -15,6 +15,8 @@
 //! from *starts*: windows projected directly, from which a span of windows is reached by steps forwards and backwards. Going
 //! backwards is going forwards through reversed time, where `c_j` becomes `(-1)^j c_j`. Spans fill the blocks that lanes work on.
 
+use crate::error::Error;
+use crate::exec::pool::Watch;
 use crate::lanes::interleaved::{Cursor, Strips};
 use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::span::span;
@@ -33,6 +35,9 @@ pub(crate) const ROUNDING: f64 = 1e4 * 1e4 * f64::EPSILON * f64::EPSILON;
 /// A lane starts afresh where the square of what left exceeds what stays by this factor: the rounding errors that a glitch leaves
 /// behind are then still below 1e-9 of what the window holds without it.
 const LOSS: f64 = 1e6;
+
+/// After so many rows the watch is called.
+const WATCHED: usize = 1 << 16;
 
 /// Tables of the projection of windows of one length on `D` polynomials; rows beyond the plan's degrees are zero.
 #[derive(Debug)]
@@ -96,7 +101,11 @@ impl<S: Lanes, const D: usize> State<S, D> {
 }
 
 impl<const D: usize> Projection<D> {
-    pub(crate) fn new(basis: &Basis) -> Self {
+    /// The plan for windows of any length, watched: their rows are copied to the kernels' degrees.
+    ///
+    /// # Errors
+    /// If the watch cancels.
+    pub(crate) fn watched(basis: &Basis, watch: &mut Watch<'_>) -> Result<Self, Error> {
         let degrees = basis.degrees();
         assert!(degrees <= D, "kernels of {D} degrees cannot hold {degrees}");
         let pad = |values: &[f64]| std::array::from_fn(|j| values.get(j).copied().unwrap_or(0.0));
@@ -105,10 +114,17 @@ impl<const D: usize> Projection<D> {
         let ahead: [f64; D] = pad(&basis.evaluate(last + 1.0, 0));
         let behind: [f64; D] = pad(&basis.evaluate(-last - 1.0, 0));
         let step_gain = 1.0 / (1.0 + ahead.iter().map(|q| q * q).sum::<f64>());
-        Self {
+        let mut rows = Vec::with_capacity(basis.rows().len());
+        for row in basis.rows() {
+            rows.push(pad(row));
+            if rows.len().is_multiple_of(WATCHED) && !watch(rows.len(), basis.rows().len()) {
+                return Err(Error::Cancelled);
+            }
+        }
+        Ok(Self {
             length: basis.length(),
             span: span(basis),
-            rows: basis.rows().map(pad).collect(),
+            rows,
             gain: pad(&differences.gain),
             damping: pad(&differences.damping),
             scale: pad(&differences.scale),
@@ -117,7 +133,7 @@ impl<const D: usize> Projection<D> {
             ahead,
             behind,
             step_gain,
-        }
+        })
     }
 
     /// Samples in a window.
@@ -307,7 +323,7 @@ mod tests {
 
         #[inline(always)]
         fn run<S: Lanes>(self, simd: S) -> (f64, f64) {
-            let projection = Projection::<16>::new(self.basis);
+            let projection = Projection::<16>::watched(self.basis, &mut |_, _| true).expect("nobody cancels");
             let mut strips = Strips::new(projection.block(), projection.length(), S::F64_LANES);
             let mut samples = self.samples.to_vec();
             samples.resize(strips.samples(), 0.0);
@@ -377,7 +393,8 @@ mod tests {
     fn spans_fill_blocks() {
         for length in (5..400).chain([2001, 20_001]) {
             for degrees in [1, 4, 16.min(length)] {
-                let projection = Projection::<16>::new(&Basis::new(length, degrees).expect("little memory"));
+                let basis = Basis::new(length, degrees).expect("little memory");
+                let projection = Projection::<16>::watched(&basis, &mut |_, _| true).expect("nobody cancels");
                 let (span, block) = (projection.span(), projection.block());
                 assert!(span.is_power_of_two() || span % 8 == 0, "span {span} at length {length}");
                 assert!(block % span == 0 && block % SHORTEST_BLOCK == 0, "block {block} at length {length}");
