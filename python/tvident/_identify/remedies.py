@@ -199,7 +199,7 @@ class Trial:
         is_worth_it = left.ratio <= _BETTER or (left.is_as_much and known)
         if not is_worth_it or self._feeds_energy(found):
             return None
-        words = f"stiffness need not change: try stiffness='constant'; {left}{known}{self._moved(found)}"
+        words = f"stiffness need not change: try stiffness='constant'; {left}{known}{self._moved(found, is_more=False)}"
         return Remedy(min(left.ratio, AS_GOOD), words, distinguishes=False, is_settled=True)
 
     def _better_known(self, found: Identification) -> str:
@@ -372,7 +372,7 @@ class Trial:
         if "lag" in chosen:
             changes.append(f"lag={call['lag']:.4g}")
         changes += [f"{name}='constant'" for name in changing if is_simple and call[name] == "constant"]
-        said = f"{', '.join(words)}: try {', '.join(changes)}; {best}{self._moved(of_best)}"
+        said = f"{', '.join(words)}: try {', '.join(changes)}; {best}{self._moved(of_best, is_more=bool(chosen))}"
         is_settled = is_simple and not flags & DOUBTFUL_RECORD
         # With an unknown less the others are told apart whatever the truth is.
         is_more = bool(chosen) and not is_none
@@ -400,15 +400,18 @@ class Trial:
             for growth in (found.value(term.name) for term in terms)
         )
 
-    def _moved(self, found: Identification) -> str:
-        """Return which parameters a better equation finds elsewhere, in words."""
-        words = []
+    def _moved(self, found: Identification, *, is_more: bool = True) -> str:
+        """Return which parameters a better equation finds elsewhere, in words; one with more in it may find that they never varied."""
+        kinds, words = self.result.settings["kinds"], []
         for name in COEFFICIENTS:
             if not isinstance(self.given[name], str) or found.settings["kinds"][name] == "known":
                 continue
             (before, error), (after, least) = median_of(self.result, name), median_of(found, name)
-            if abs(after - before) > max(_ELSEWHERE * np.hypot(error, least), _MATTERS * abs(after)):
-                words.append(f", {name}{BECOMES}{with_error(after, least)} {found.units[name]}")
+            is_moved = abs(after - before) > max(_ELSEWHERE * np.hypot(error, least), _MATTERS * abs(after))
+            is_settled = is_more and kinds[name] == "varying" and found.settings["kinds"][name] == "constant"
+            if is_moved or is_settled:
+                constant = " and constant" if is_settled else ""
+                words.append(f", {name}{BECOMES}{with_error(after, least)} {found.units[name]}{constant}")
         return "".join(words)
 
     def _change(self, one: str, found: Identification) -> str:
