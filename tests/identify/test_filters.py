@@ -128,7 +128,7 @@ def test_a_filter_of_the_angle_without_a_lag_is_said(cutoff: float, order: int, 
 
 
 @pytest.mark.first(1)
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [2, 0, 1, 3])
 @pytest.mark.parametrize("pattern", ["slider", "constant"])
 def test_no_filter_is_said_of_what_was_not_filtered(pattern: Pattern, seed: int) -> None:
     """Neither of white noise, nor of none, nor of rounding, nor of a friction that nothing is told of."""

@@ -11,7 +11,7 @@ use crate::identify::scanned::OTHER_CONSTANT;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::report::filter::{UNSURE, shared_noise};
 use crate::identify::weak::session::Session;
-use crate::inference::missing_terms::{Missing, Suspect};
+use crate::inference::missing_terms::{CONSPICUOUS, Missing, Suspect};
 use crate::regression::fit::Fit;
 use crate::regression::limits::{NEGLIGIBLE, NOISE_MODEL_FAILS};
 use crate::regression::model::Model;
@@ -23,6 +23,10 @@ use crate::weak_form::weak_rows::WeakRows;
 /// The least part of the torque's mean square that powers of it must have to be said: half a percent of the torque. Rounding of an angle beside a
 /// torque without noise is seen as a quarter of a percent.
 const LEAST_OF_POWERS: f64 = 2.5e-5;
+
+/// How many times as large a term that is missing is in the torque for what the torque tells of itself to be no more than what that term is not exactly, in
+/// mean squares: ten times.
+const FAR_LARGER: f64 = 100.0;
 
 /// From how many times the half-width on another test function is asked, and by how much narrower than that the next is.
 const WIDER: usize = 2;
@@ -144,6 +148,20 @@ impl Session<'_, '_, '_> {
                 }
             }
             suspects.push((suspect, is_little));
+        }
+        if suspects.iter().any(|(one, _)| one.is_conspicuous()) {
+            // A friction or a spring that is missing comes first: beside what it is not exactly all else is judged once it is in the equation.
+            let mean_square = |place: usize, value: f64| value * value * rows.mean_square_of(regressors.start + place);
+            let mut largest = 0.0_f64;
+            for (place, _) in candidates.iter().enumerate().filter(|(_, one)| matches!(one, Missing::Term(_))) {
+                let (value, index) = (beside.pooled.values[count + place], count + place);
+                let error = beside.variance_of(&problem, index, &covariance, &mut self.stages)?.sqrt();
+                if value.abs() > CONSPICUOUS * error {
+                    largest = largest.max(mean_square(place, value));
+                }
+            }
+            let place_of = |missing: Missing| candidates.iter().position(|&one| one == missing).unwrap_or_default();
+            suspects.retain(|(one, _)| FAR_LARGER * mean_square(place_of(one.missing), one.value) > largest);
         }
         Ok(Some(suspects))
     }
