@@ -72,7 +72,7 @@ pub struct Test {
 pub(crate) enum NoiseFrom {
     /// The highest frequencies of the channels.
     Channels,
-    /// What the equations leave.
+    /// What the equations leave, or the step that a channel was rounded to: it need not be white.
     Equations,
 }
 

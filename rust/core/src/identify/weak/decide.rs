@@ -181,7 +181,7 @@ impl Session<'_, '_, '_> {
             expected: decided.expected,
             covariance: &decided.covariance,
             inflation: decided.error.max(1.0),
-            from: if is_raised { NoiseFrom::Equations } else { NoiseFrom::Channels },
+            from: if is_raised || self.is_rounding { NoiseFrom::Equations } else { NoiseFrom::Channels },
             equations: 1,
         };
         let mut results = constancy::test(&problem, fit, noise, self.options.instructions, &mut self.stages)?;

@@ -43,6 +43,9 @@ const LONG: usize = 1_000_000;
 /// Times that pulses are looked for, with those of the last time taken off the torque.
 const PULSE_ROUNDS: usize = 2;
 
+/// The noise of a channel is that of its rounding where it is at most so many times as large, in variance.
+const HARDLY_MORE: f64 = 1.5;
+
 /// The samples that count, and how much.
 type Counted<'a> = (Option<&'a [bool]>, Option<&'a [f64]>);
 
@@ -302,6 +305,8 @@ fn settled(
     channel_noise: [f64; 2],
     mut stages: Stages<'_, '_>,
 ) -> Result<WeakIdentified, Error> {
+    let step = options.quantisation.unwrap_or_else(|| quantisation_step(record.angle));
+    let is_rounding = step > 0.0 && channel_noise[0] <= HARDLY_MORE * step * step / 12.0;
     // What looks like a pulse where samples are missing may be a loss that was not detected.
     let (mut pulses, mut calm, mut round) = (Vec::new(), Vec::new(), if whole { 0 } else { PULSE_ROUNDS });
     loop {
@@ -315,6 +320,7 @@ fn settled(
             options,
             noise: [0.0; 2],
             channel_noise,
+            is_rounding,
             scan: Scan::default(),
             free_offset: FreeOffset::default(),
             windowed_offset: None,

@@ -29,6 +29,8 @@ pub(crate) struct Session<'a, 'b, 'c> {
     /// Variances of the noise of angle and torque that decisions are made with, and those that the channels show by themselves.
     pub(crate) noise: [f64; 2],
     pub(crate) channel_noise: [f64; 2],
+    /// Whether the noise of the angle is that of its rounding: in slow motion it lasts, so that parts of the record scatter more than white noise says.
+    pub(crate) is_rounding: bool,
     /// Estimates by the width of the test function.
     pub(crate) scan: Scan,
     /// How much better an offset would predict that is free in every window, where the record contradicts a constant one.
