@@ -19,6 +19,12 @@ pub(crate) const LITTLE: f64 = 1e-5;
 /// A smaller part of it is explained for every purpose.
 pub(crate) const NEGLIGIBLE: f64 = 1e-6;
 
+/// What windows that are hardly longer than a test function may leave, in mean squares of the torque that was recorded and of the largest in the equation:
+/// little of the largest, that of a spring and a mass that swing against each other, as a stiffness does that bends within windows.
+pub(crate) fn left_by_short_windows(recorded: f64, largest: f64) -> f64 {
+    (UNEXPLAINED * recorded).min(LITTLE * largest)
+}
+
 /// The flag of a condition number; one that is no number tells nothing apart.
 pub(crate) fn status_of(condition: f64) -> Status {
     if !condition.is_finite() {

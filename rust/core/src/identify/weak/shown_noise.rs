@@ -18,7 +18,7 @@ use crate::noise::coherence::{CORRELATED_NOISE, noise_coherence};
 use crate::noise::low_passed::density_above_motion;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
-use crate::regression::limits::{LITTLE, UNEXPLAINED};
+use crate::regression::limits::{UNEXPLAINED, left_by_short_windows};
 use crate::regression::model::Model;
 use crate::regression::problem::Problem;
 use crate::regression::residuals::{residuals, usual_variance};
@@ -168,15 +168,16 @@ impl Session<'_, '_, '_> {
     }
 
     /// Whether so much is left of the equations that they are wrong rather than noisy: a term is missing, or the torque is late. Windows hardly
-    /// longer than the test function follow what is wrong as if it were motion: they must leave little of the largest torque, that of a spring and
-    /// a mass that swing against each other, as a stiffness that bends within windows does. What a low-passed torque shows above the motion is
-    /// noise, however much it is.
+    /// longer than the test function follow what is wrong as if it were motion: they must leave less. What a low-passed torque shows above the motion
+    /// is noise, however much it is.
     fn is_no_noise(&mut self, chosen: &mut Chosen, model: &Model) -> Result<bool, Error> {
         let fitted = self.take_fitted(chosen, model)?;
-        let mut most = UNEXPLAINED * chosen.weak.rows.mean_square();
-        if fitted.has_windows_of_a_function(&chosen.weak) {
-            most = most.min(LITTLE * chosen.weak.largest_torque(chosen.parameters, self.noise[0]));
-        }
+        let recorded = chosen.weak.rows.mean_square();
+        let most = if fitted.has_windows_of_a_function(&chosen.weak) {
+            left_by_short_windows(recorded, chosen.weak.largest_torque(chosen.parameters, self.noise[0]))
+        } else {
+            UNEXPLAINED * recorded
+        };
         let is_more = fitted.expected.torque > most;
         chosen.fitted = Some(fitted);
         Ok(is_more && self.noise[1] > MORE * self.density_above_motion())

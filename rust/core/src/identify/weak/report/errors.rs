@@ -6,7 +6,7 @@ use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
-use crate::regression::limits::{LITTLE, NEGLIGIBLE, NOISE_MODEL_FAILS, UNEXPLAINED};
+use crate::regression::limits::{LITTLE, NEGLIGIBLE, NOISE_MODEL_FAILS, UNEXPLAINED, left_by_short_windows};
 use crate::regression::row_covariance::RowCovariance;
 use crate::status::Status;
 use crate::weak_form::weak_rows::WeakRows;
@@ -36,12 +36,6 @@ impl Errors {
     pub(crate) fn is_explained(&self, rows: &Rows) -> bool {
         self.left <= NEGLIGIBLE * rows.mean_square()
     }
-
-    /// Whether next to nothing is left of the largest torque, and little of the one that was recorded. Near a resonance the torques of spring and mass
-    /// are far larger than the drive's: a part of them that no window follows is more of the drive's, and correlated.
-    fn is_explained_beside_motion(&self, rows: &Rows, largest: f64) -> bool {
-        self.left <= (NEGLIGIBLE * largest).min(LITTLE * rows.mean_square())
-    }
 }
 
 impl Session<'_, '_, '_> {
@@ -67,8 +61,7 @@ impl Session<'_, '_, '_> {
         let raised = self.raised(weak, decided);
         let matters = errors.left > UNEXPLAINED * weak.rows.mean_square();
         errors.over_channels = errors.error * raised;
-        let largest = || weak.largest_torque(self.parameters(&decided.model, fit), self.noise[0]);
-        if coloured && !errors.is_explained_beside_motion(&weak.rows, largest()) {
+        if coloured && errors.left > self.left_beside_motion(weak, decided, fit) {
             errors.status |= Status::COLOURED;
         }
         if fails && !errors.is_explained(&weak.rows) || matters && errors.over_channels > NOISE_MODEL_FAILS {
@@ -88,5 +81,15 @@ impl Session<'_, '_, '_> {
             errors.expected = Expected::new(&errors.covariance, errors.covariance.variance());
         }
         Ok(errors)
+    }
+
+    /// What may be left and be correlated, as a mean square: next to nothing of the largest torque, and little of the one that was recorded. Near a
+    /// resonance the torques of spring and mass are far larger than the drive's: a part of them that no window follows is more of the drive's. Beside the
+    /// shortest windows it may be more: there are none that follow it.
+    fn left_beside_motion(&self, weak: &WeakRows, decided: &Decided, fit: &Fit) -> f64 {
+        let recorded = weak.rows.mean_square();
+        let largest = weak.largest_torque(self.parameters(&decided.model, fit), self.noise[0]);
+        let most = (NEGLIGIBLE * largest).min(LITTLE * recorded);
+        if decided.has_windows_of_a_function(weak) { most.max(left_by_short_windows(recorded, largest)) } else { most }
     }
 }
