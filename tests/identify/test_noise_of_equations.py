@@ -50,7 +50,7 @@ def test_less_noise_is_never_worse(converter: bool, torque_snr_db: float) -> Non
 
 @pytest.mark.parametrize(
     ("seconds", "sample_rate", "seed", "converter"),
-    [(8.0, 2000.0, 6, True), *long((8.0, 1000.0, 8, True)), (20.0, 200.0, 3, False), *long((60.0, 200.0, 4, True))],
+    [(8.0, 2000.0, 6, True), (8.0, 1000.0, 8, True), (20.0, 200.0, 3, False), *long((60.0, 200.0, 4, True))],
 )
 def test_less_noise_is_never_worse_at_any_rate(seconds: float, sample_rate: float, seed: int, converter: bool) -> None:
     """Spectra ask for test functions too wide for a stiffness that changes; few samples a cycle leave what no window follows."""
@@ -60,6 +60,8 @@ def test_less_noise_is_never_worse_at_any_rate(seconds: float, sample_rate: floa
     assert result.settings["kinds"]["inertia"] == result.settings["kinds"]["damping"] == "constant"
     assert result.record_status == 0
     assert result.jumps == ()
+    # Of a record without noise nobody needs to know how many times that is.
+    assert not any("e+" in reason for reason in result.reasons)
     assert error(result.inertia, rig.inertia) < CONSTANT_ERROR
     assert error(result.damping, rig.damping) < CONSTANT_ERROR
     assert error(result.stiffness, rig.stiffness) < STIFFNESS_ERROR

@@ -37,6 +37,9 @@ _SHOWN = 6
 _BEYOND_CHANCE = 4.0
 """A parameter jumps where it differs by more than so many standard errors of the difference: one of 16 000 does so by chance."""
 
+_COUNTED = 1e6
+"""From so many times the noise on it is none that counts: the record is free of noise, or nearly."""
+
 FREE_OFFSET = "an offset that is free in every window predicts better"
 
 _BESIDE = " beside the lag that is given"
@@ -256,7 +259,7 @@ class Explained:
         if not self.found.lengths:
             return []
         words, error = f"windows of {self.found.regression_window} samples", self.found.prediction_error
-        left = f"cross-validation error {error:.3g} times the variance of the noise (1 is the best possible)"
+        left = f"cross-validation error {_times_noise(error)} (1 is the best possible)"
         why = "best of all lengths" if "regression_window" in self.chosen else "as given"
         return [
             f"{words}: {why}; {left}",
@@ -306,7 +309,7 @@ class Explained:
         words = []
         if Status.NOISE_MODEL in flags:
             words.append(
-                f"the cross-validation error is {self.found.prediction_error:.3g} times the variance of the noise: is a term missing, "
+                f"the cross-validation error is {_times_noise(self.found.prediction_error)}: is a term missing, "
                 "is the torque delayed, or is the noise not white because a channel was filtered or drifts? Standard errors are "
                 "estimated from the residuals instead, and may be too small"
             )
@@ -406,3 +409,9 @@ class Explained:
                 "cycles or more, with 20 samples or more per cycle; do not trust these numbers otherwise"
             )
         return [words]
+
+
+def _times_noise(error: float) -> str:
+    """Return how many times the variance of the noise something is, in words."""
+    many = "more than a million" if error > _COUNTED else f"{error:.3g}"
+    return f"{many} times the variance of the noise"
