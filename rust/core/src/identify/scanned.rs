@@ -144,10 +144,10 @@ impl Scans {
     /// The half-width to accept where another one lies off the plateau: a little wider than its narrowest, which is the first that its
     /// errors cannot tell from the others. A wider one that agrees may stay.
     pub(crate) fn accepted(&self, half_width: usize) -> Option<usize> {
-        let plateau = self.best.accepted_plateau()?;
-        let (place, _) = self.corrected.nearest(half_width)?;
+        self.best.accepted_plateau()?;
+        let (place, chosen) = self.corrected.nearest(half_width)?;
         let on_its_own = self.corrected.accepted_plateau().is_some_and(|own| own.holds(place));
-        if on_its_own || place > plateau.last && !self.contradict(half_width) {
+        if on_its_own || self.is_wider(chosen) && !self.contradict(half_width) {
             return None;
         }
         self.best.inside()
@@ -157,14 +157,18 @@ impl Scans {
     /// for wide ones says nothing for narrow ones, beside which windows are so short that the noise of the regressors spoils what is constant.
     pub(crate) fn accepted_beside_windows(&self, half_width: usize) -> Option<usize> {
         let accepted = self.accepted(half_width)?;
-        let plateau = self.best.accepted_plateau()?;
-        let (place, _) = self.corrected.nearest(half_width)?;
-        if place > plateau.last {
+        let (place, chosen) = self.corrected.nearest(half_width)?;
+        if self.is_wider(chosen) {
             return self.best.inside_widest();
         }
         // Wider than those that agree with the correction, and on the plateau without it.
         let is_wider = self.corrected.accepted_plateau().is_some_and(|own| place > own.last) && half_width > accepted;
         Some(accepted).filter(|_| !is_wider || self.contradict(half_width))
+    }
+
+    /// Whether one is wider than the whole plateau. Both scans need not have the same widths.
+    fn is_wider(&self, one: &AtScale) -> bool {
+        self.best.widest().is_some_and(|widest| one.half_width > widest)
     }
 
     /// Whether a half-width, corrected for noise, contradicts the plateau.
@@ -210,6 +214,14 @@ mod tests {
         let scans = Scans { best: with_plateau(3..=7), corrected: with_plateau(3..=7) };
         assert_eq!([64, 8, 2048].map(|half| scans.accepted(half)), [None, Some(64), Some(64)]);
         assert_eq!([64, 8, 2048].map(|half| scans.accepted_beside_windows(half)), [None, Some(64), Some(256)]);
+    }
+
+    #[test]
+    fn widths_are_compared_whatever_others_each_scan_has() {
+        let mut scans = Scans { best: with_plateau(3..=7), corrected: with_plateau(3..=7) };
+        scans.corrected.scales.drain(..3);
+        scans.corrected.find_plateau();
+        assert_eq!([64, 2048].map(|half| scans.accepted_beside_windows(half)), [None, Some(256)]);
     }
 
     #[test]
