@@ -178,6 +178,26 @@ def test_percents_have_two_digits_of_what_is_left(share: float, words: str) -> N
     assert percent(share) == words
 
 
+def test_a_torque_that_is_mostly_noise_is_explained_as_far_as_it_is_none() -> None:
+    """A servo's slow motion takes a quarter of what its torque sensor shows, and the rest is white."""
+    generator, t = np.random.default_rng(0), np.arange(20_000) / 1000
+    speed = np.cumsum(generator.standard_normal(t.size)) * 0.02
+    speed = np.convolve(speed, np.hanning(800) / np.hanning(800).sum(), "same")
+    inertia, damping = 1e-4, 7e-5
+    torque = inertia * np.gradient(speed, t) + damping * speed
+    noise = 4 * np.std(torque) * generator.standard_normal(t.size)
+    call: dict[str, Any] = {"sample_rate": 1000, "inertia": "constant", "damping": "constant", "stiffness": 0}
+    result = tvident.identify(np.cumsum(speed) / 1000, torque + noise, **call)
+    first = result.summary().splitlines()[0]
+    assert "of the torque, the rest is its noise" in first
+    assert "do not trust" not in first
+    value, error = result.constants["damping"]
+    assert abs(value - damping) < 3 * error < damping
+    # Beside a torque that nothing has to do with it is no such thing.
+    other = tvident.identify(np.cumsum(speed) / 1000, noise, **call)
+    assert other.summary().startswith("do not trust: ")
+
+
 def test_a_model_that_predicts_worse_than_a_constant_explains_nothing() -> None:
     rig = tvident.simulate_torsional_rig(duration=5.0, seed=4)
     result = tvident.identify(rig.angle, -np.roll(rig.torque, 5), sample_rate=1000)

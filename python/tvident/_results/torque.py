@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _core
 from tvident._derivatives import fit_local_polynomials
 from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET
 from tvident._results.response import Model, without_gaps
@@ -154,6 +155,16 @@ def kernels_of(half: int, exponent: float, period: float) -> Array:
     seconds = half * period
     rows = np.array([phi.deriv(2)(u) / seconds**2, -phi.deriv(1)(u) / seconds, phi(u)]) / phi(u).sum()
     return np.asarray(rows + np.outer(np.array([0.0, 0.0, 1.0]) - rows.sum(axis=1), rows[2]))
+
+
+def noise_of_compared(torque: npt.NDArray[np.number], settings: Mapping[str, Any]) -> float:
+    """Return the variance that the torque's own noise has in what is compared, as if it were white; NaN where the record is too short."""
+    there = np.asarray(torque, np.float64)
+    variance = float(_core.noise(there[np.isfinite(there)])[0].sigma) ** 2
+    if settings["form"] == "strong":
+        return variance
+    *_, phi = kernels_of(settings["window_length"] // 2, settings["exponent"], 1.0)
+    return variance * float(phi @ phi)
 
 
 def correlated_with(values: Array, kernels: Array) -> Array:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tvident._arguments import explained_in_words, percent, percentiles, to_digits_of, told_once
+from tvident._results.torque import noise_of_compared
 from tvident._results.words import BECOMES, CONDITIONS, OTHER_UNIT, TRIED
 from tvident._status import Status
 from tvident._units import in_words_of
@@ -28,6 +29,9 @@ _OFTEN = 0.05
 
 _LITTLE = 0.5
 """A share of the torque that a model must explain to be one."""
+
+_AS_NOISE, _MORE = 1.5, 0.1
+"""What is left of a torque is its noise up to so many times its variance, and what is predicted is at least this part of it."""
 
 _DISTRUST = {
     Status.RANK_DEFICIENT: "the record does not determine the parameters",
@@ -98,7 +102,8 @@ def verdict_of_trusted(result: Any, known: str, share: float | None) -> str:
     """Return the verdict on a result that nothing says to distrust, by how well it is known and by how much of the torque it explains."""
     parts = [known] if known else []
     if share is not None:
-        parts.append(f"model explains {percent(share)} of the torque")
+        rest = ", the rest is its noise" if share < _LITTLE else ""
+        parts.append(f"model explains {percent(share)} of the torque{rest}")
     words = ", ".join(parts) or "nothing was unknown"
     is_doubtful = result.record_status & _DOUBTS and result.advice
     if is_doubtful or any(one in line for line in result.advice for one in (TRIED, *CONDITIONS)):
@@ -117,6 +122,24 @@ def explained(result: Any) -> float | None:
     return share_of(recorded, predicted)
 
 
+def _is_rest_noise(result: Any) -> bool:
+    """Return whether a record's torque is more than its own noise, and what constants do not predict is no more than that.
+
+    What changes follows noise as well.
+    """
+    if CHANGING & set(result.settings["kinds"].values()):
+        return False
+    kept = result._recorded  # noqa: SLF001 - the channel itself, beside what is compared
+    try:
+        _, recorded, predicted = result.predicted_torque()
+    except ValueError:
+        return False
+    there = np.isfinite(recorded) & np.isfinite(predicted)
+    noise = noise_of_compared(kept.torques, result.settings)
+    left, whole = (float(np.var(one[there])) for one in (recorded - predicted, recorded))
+    return left <= _AS_NOISE * noise and whole - left >= _MORE * noise
+
+
 def share_of(recorded: Any, predicted: Any) -> float | None:
     """Return the share of a torque's variance that is predicted."""
     there = np.isfinite(recorded) & np.isfinite(predicted)
@@ -131,11 +154,19 @@ def distrust(result: Any) -> str | None:
 
 def _distrusted(result: Any, share: Callable[[], float | None]) -> str | None:
     signs = (_sign(result, name) for name in ("inertia", "damping", "stiffness"))
-    return why_not(result, lambda: next(filter(None, signs), None), share)
+    return why_not(result, lambda: next(filter(None, signs), None), share, lambda: _is_rest_noise(result))
 
 
-def why_not(result: Any, sign: Callable[[], str | None], share: Callable[[], float | None]) -> str | None:
-    """Return why numbers are not to be trusted, by flags, by what is wrong with a sign, and by the share of the torque explained."""
+def why_not(
+    result: Any,
+    sign: Callable[[], str | None],
+    share: Callable[[], float | None],
+    is_noise: Callable[[], bool] = lambda: False,
+) -> str | None:
+    """Return why numbers are not to be trusted, by flags, by what is wrong with a sign, and by the share of the torque explained.
+
+    A little of the torque is enough where the rest is its noise.
+    """
     valid = result.status & Status.INVALID == 0
     if not valid.any():
         return "nothing could be identified"
@@ -148,7 +179,7 @@ def why_not(result: Any, sign: Callable[[], str | None], share: Callable[[], flo
     if result.record_status & Status.SCALES_DISAGREE:
         return "test functions or windows of other lengths do not find these parameters"
     explains = share()
-    if explains is not None and explains < _LITTLE:
+    if explains is not None and explains < _LITTLE and not is_noise():
         return f"the model explains {explained_in_words(explains)} of the torque"
     trusted = float(np.mean(result.trusted))
     return f"{1 - trusted:.0%} of the samples are flagged" if trusted < _LITTLE else None
