@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::least_squares::bandwidth::Bandwidth;
 use crate::least_squares::plan::RollingLeastSquares;
+use crate::least_squares::row_products::load_some;
 use crate::simd::aligned::OnLines;
 use crate::simd::vectors::{Lanes, MOST_LANES};
 
@@ -57,14 +58,18 @@ impl<'a> ErrorScale<'a> {
             self.of_windows(first, counts, scales);
             for (place, sums) in (0..).step_by(S::F64_LANES).zip(sums.chunks(S::F64_LANES)) {
                 let into = (first + place - rows.start, normal, &mut *errors);
-                self.write_some::<S, N, P, R>(simd, sums, &scales[place..], into);
+                if sums.len() == S::F64_LANES {
+                    self.write_some::<S, N, P, R, true>(simd, sums, &scales[place..], into);
+                } else {
+                    self.write_some::<S, N, P, 0, false>(simd, sums, &scales[place..], into);
+                }
             }
         }
     }
 
-    /// The same for as many windows as a vector holds, or fewer.
+    /// The same for as many windows as a vector holds, or where they are not `WHOLE` for fewer.
     #[inline(always)]
-    fn write_some<S: Lanes, const N: usize, const P: usize, const R: usize>(
+    fn write_some<S: Lanes, const N: usize, const P: usize, const R: usize, const WHOLE: bool>(
         &self,
         simd: S,
         sums: &[[f64; P]],
@@ -72,8 +77,7 @@ impl<'a> ErrorScale<'a> {
         (place, normal, errors): (usize, &[&[f64]], &mut [&mut [f64]]),
     ) {
         let (p, count) = (if R == 0 { self.plan.regressors } else { R }, sums.len());
-        // A load under a mask takes no longer than another, and serves fewer windows as well. A store does, on some processors.
-        let some = |numbers: &[f64]| simd.partial_load_f64s(&numbers[..count]);
+        let some = |numbers: &[f64]| load_some::<S, WHOLE>(simd, numbers, count);
         let mut of_pairs = OnLines([simd.splat_f64s(0.0); P]);
         turn(simd, sums, &mut of_pairs.0);
         for (sum, &factor) in of_pairs.0.iter_mut().zip(&self.factors) {
@@ -106,7 +110,7 @@ impl<'a> ErrorScale<'a> {
             // Where there are no parameters the diagonal is NaN, and so is the error.
             let error = simd.sqrt_f64s(simd.mul_f64s(scale, variance));
             let into = &mut errors[place..];
-            if count == S::F64_LANES {
+            if WHOLE {
                 simd.store(into, 0, error);
             } else {
                 simd.partial_store_f64s(&mut into[..count], error);
