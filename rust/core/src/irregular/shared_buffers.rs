@@ -84,9 +84,9 @@ impl GroupSamples {
             self.all[lane] = range.len();
             self.first[lane] = placed[group.windows.start].samples.len();
             let columns = self.times.chunks_exact_mut(lanes).zip(self.samples.chunks_exact_mut(lanes));
-            for ((time, sample), at) in columns.zip(range) {
-                time[lane] = (times[at] - middle) * scale;
-                sample[lane] = record[at] - reference;
+            for ((time, sample), (at, value)) in columns.zip(times[range.clone()].iter().zip(&record[range])) {
+                time[lane] = (at - middle) * scale;
+                sample[lane] = value - reference;
             }
         }
     }
@@ -94,6 +94,8 @@ impl GroupSamples {
     /// Sums over each lane's first window, from which the polynomial that fits all of the group best was taken off.
     #[inline(always)]
     pub(crate) fn begin<S: Lanes>(&mut self, simd: S, degrees: usize, factor: &mut SharedFactor<S>) -> SlidSums<S> {
+        // Up to the least of these, samples belong to the first window of every lane.
+        let least = self.first[..S::F64_LANES].iter().copied().min().unwrap_or(0);
         let (first, all) = (counts(&self.first), counts(&self.all));
         let (first, all) = (simd.load(&first, 0), simd.load(&all, 0));
         let zero = simd.splat_f64s(0.0);
@@ -102,7 +104,7 @@ impl GroupSamples {
         let end = self.first.iter().max().map_or(0, |first| first.next_multiple_of(AT_ONCE));
         while at < end {
             let (times, samples) = (rows(simd, &self.times, at), rows(simd, &self.samples, at));
-            let weights: [S::f64s; AT_ONCE] = from_fn(|n| before(simd, at + n, first));
+            let weights = all_before(simd, at, (least, first));
             sums.add(simd, degrees, &times, &weights, &samples);
             for n in 0..AT_ONCE {
                 let weighted = simd.mul_f64s(samples[n], weights[n]);
@@ -121,15 +123,15 @@ impl GroupSamples {
             sums.add(simd, degrees, &times, &weights, &samples);
             at += AT_ONCE;
         }
-        factor.set_below(degrees, 0, &sums.products.0);
+        factor.below.0[0] = sums.products.0;
         factor.decompose(simd, degrees, &sums.moments.0, 1);
-        let mut coefficients = OnLines(factor.rows.0[degrees]);
+        let mut coefficients = OnLines(factor.below.0[0]);
         factor.solve(simd, degrees, &mut coefficients);
         let mut off = TakenOff::new(simd, coefficients);
         for at in (0..end).step_by(AT_ONCE) {
             let times = rows(simd, &self.times, at);
             let mut samples = rows(simd, &self.samples, at);
-            let weights: [S::f64s; AT_ONCE] = from_fn(|n| before(simd, at + n, first));
+            let weights = all_before(simd, at, (least, first));
             off.take_off(simd, degrees, &times, &weights, &mut samples);
             for (n, sample) in samples.into_iter().enumerate() {
                 simd.store(&mut self.left, (at + n) * S::F64_LANES, sample);
@@ -149,6 +151,12 @@ impl GroupSamples {
 #[inline(always)]
 fn rows<S: Lanes>(simd: S, column: &Aligned, at: usize) -> [S::f64s; AT_ONCE] {
     from_fn(|n| simd.load(column, (at + n) * S::F64_LANES))
+}
+
+/// One where a row lies before the end, zero where it does not, of some rows; all lie before the least end up to that.
+#[inline(always)]
+fn all_before<S: Lanes>(simd: S, at: usize, (least, end): (usize, S::f64s)) -> [S::f64s; AT_ONCE] {
+    if at + AT_ONCE <= least { [simd.splat_f64s(1.0); AT_ONCE] } else { from_fn(|n| before(simd, at + n, end)) }
 }
 
 /// One where a row lies before the end, zero where it does not.

@@ -1,7 +1,7 @@
 //! The order of windows side by side, their derivatives and standard errors: as [`crate::irregular::window_fit`] has them for a window alone.
 
 use crate::irregular::order_table::TableColumns;
-use crate::irregular::shared_factor::{DERIVATIVES, SharedFactor};
+use crate::irregular::shared_factor::DERIVATIVES;
 use crate::irregular::shared_sums::MOST;
 use crate::simd::aligned::OnLines;
 use crate::simd::vectors::Lanes;
@@ -205,24 +205,4 @@ pub(crate) fn sums<S: Lanes>(
         }
     }
     values
-}
-
-/// `V' a`: what the polynomial with coefficients `a` in the shared basis has in the orthogonal one of each window.
-#[inline(always)]
-pub(crate) fn turned<S: Lanes>(
-    simd: S,
-    degrees: usize,
-    factor: &SharedFactor<S>,
-    coefficients: &[S::f64s; MOST],
-    turned: &mut [S::f64s; MOST],
-) {
-    let degrees = degrees.min(MOST);
-    turned[..degrees].fill(simd.splat_f64s(0.0));
-    for (row, coefficient) in
-        factor.rows.0.iter().zip(coefficients).take(degrees).enumerate().map(|(n, pair)| (&pair.0[..=n], pair.1))
-    {
-        for (turned, value) in turned.iter_mut().zip(row) {
-            *turned = simd.mul_add_f64s(*value, *coefficient, *turned);
-        }
-    }
 }

@@ -35,31 +35,88 @@ impl<S: Lanes> ChebyshevSums<S> {
         samples: &[S::f64s; N],
     ) {
         let degrees = degrees.min(MOST);
-        let mut twice = *times;
-        // The weight multiplies every polynomial, for their recurrence is linear. The one before the last has the other sign.
-        let (mut last, mut before) = (*weights, *times);
-        for n in 0..N {
-            twice[n] = simd.add_f64s(times[n], times[n]);
-            before[n] = simd.neg_f64s(simd.mul_f64s(times[n], weights[n]));
+        // The weight multiplies every polynomial, for their recurrence is linear.
+        let mut pair = NeighbouringDegrees::new(simd, times, weights);
+        let (moments, higher) = self.moments.0[..2 * degrees - 1].split_at_mut(degrees);
+        let (moments, last_moment) = moments.as_chunks_mut::<2>();
+        let (products, last_product) = self.products.0[..degrees].as_chunks_mut::<2>();
+        for (moments, products) in moments.iter_mut().zip(products) {
+            add_all(simd, &mut moments[0], &pair.lower);
+            add_products(simd, &mut products[0], &pair.lower, samples);
+            pair.raise_lower(simd);
+            add_all(simd, &mut moments[1], &pair.upper);
+            add_products(simd, &mut products[1], &pair.upper, samples);
+            pair.raise_upper(simd);
         }
-        for k in 0..degrees {
-            let (mut moment, mut product) = (self.moments.0[k], self.products.0[k]);
-            for n in 0..N {
-                moment = simd.add_f64s(moment, last[n]);
-                product = simd.mul_add_f64s(last[n], samples[n], product);
-                (last[n], before[n]) = (simd.mul_add_f64s(twice[n], last[n], before[n]), simd.neg_f64s(last[n]));
-            }
-            (self.moments.0[k], self.products.0[k]) = (moment, product);
+        if let ([moment], [product]) = (last_moment, last_product) {
+            add_all(simd, moment, &pair.lower);
+            add_products(simd, product, &pair.lower, samples);
+            pair.raise_lower(simd);
+            std::mem::swap(&mut pair.lower, &mut pair.upper);
         }
-        for k in degrees..2 * degrees - 1 {
-            let mut moment = self.moments.0[k];
-            for n in 0..N {
-                moment = simd.add_f64s(moment, last[n]);
-                (last[n], before[n]) = (simd.mul_add_f64s(twice[n], last[n], before[n]), simd.neg_f64s(last[n]));
-            }
-            self.moments.0[k] = moment;
+        let (moments, last_moment) = higher.as_chunks_mut::<2>();
+        for moments in moments {
+            add_all(simd, &mut moments[0], &pair.lower);
+            pair.raise_lower(simd);
+            add_all(simd, &mut moments[1], &pair.upper);
+            pair.raise_upper(simd);
+        }
+        if let [moment] = last_moment {
+            add_all(simd, moment, &pair.lower);
         }
     }
+}
+
+/// Polynomials of two degrees that follow each other, at some times: by turns each is raised above the other, in its place.
+struct NeighbouringDegrees<S: Lanes, const N: usize> {
+    twice: [S::f64s; N],
+    lower: [S::f64s; N],
+    upper: [S::f64s; N],
+}
+
+impl<S: Lanes, const N: usize> NeighbouringDegrees<S, N> {
+    /// The lowest two, times a weight.
+    #[inline(always)]
+    fn new(simd: S, times: &[S::f64s; N], weights: &[S::f64s; N]) -> Self {
+        let (mut twice, mut upper) = (*times, *times);
+        for n in 0..N {
+            twice[n] = simd.add_f64s(times[n], times[n]);
+            upper[n] = simd.mul_f64s(times[n], weights[n]);
+        }
+        Self { twice, lower: *weights, upper }
+    }
+
+    #[inline(always)]
+    fn raise_lower(&mut self, simd: S) {
+        for n in 0..N {
+            self.lower[n] = simd.mul_add_f64s(self.twice[n], self.upper[n], simd.neg_f64s(self.lower[n]));
+        }
+    }
+
+    #[inline(always)]
+    fn raise_upper(&mut self, simd: S) {
+        for n in 0..N {
+            self.upper[n] = simd.mul_add_f64s(self.twice[n], self.lower[n], simd.neg_f64s(self.upper[n]));
+        }
+    }
+}
+
+#[inline(always)]
+fn add_all<S: Lanes, const N: usize>(simd: S, sum: &mut S::f64s, values: &[S::f64s; N]) {
+    let mut total = *sum;
+    for value in values {
+        total = simd.add_f64s(total, *value);
+    }
+    *sum = total;
+}
+
+#[inline(always)]
+fn add_products<S: Lanes, const N: usize>(simd: S, sum: &mut S::f64s, ones: &[S::f64s; N], others: &[S::f64s; N]) {
+    let mut total = *sum;
+    for (one, other) in ones.iter().zip(others) {
+        total = simd.mul_add_f64s(*one, *other, total);
+    }
+    *sum = total;
 }
 
 /// A sum of polynomials that is taken off samples, and sums of what is left of them.
@@ -91,31 +148,42 @@ impl<S: Lanes, const N: usize> TakenOff<S, N> {
         samples: &mut [S::f64s; N],
     ) {
         let degrees = degrees.min(MOST);
-        let (mut twice, mut before, mut last) = (*times, *times, [simd.splat_f64s(1.0); N]);
-        for n in 0..N {
-            twice[n] = simd.add_f64s(times[n], times[n]);
-            before[n] = simd.neg_f64s(times[n]);
-        }
+        let mut pair = NeighbouringDegrees::new(simd, times, &[simd.splat_f64s(1.0); N]);
         // From the highest coefficient down would need no table, but products need the polynomials.
-        for k in 0..degrees {
-            self.polynomials.0[k] = last;
-            for n in 0..N {
-                samples[n] = simd.negate_mul_add_f64s(self.coefficients.0[k], last[n], samples[n]);
-                (last[n], before[n]) = (simd.mul_add_f64s(twice[n], last[n], before[n]), simd.neg_f64s(last[n]));
-            }
+        let (polynomials, last_polynomial) = self.polynomials.0[..degrees].as_chunks_mut::<2>();
+        let (coefficients, last_coefficient) = self.coefficients.0[..degrees].as_chunks::<2>();
+        for (polynomials, coefficients) in polynomials.iter_mut().zip(coefficients) {
+            polynomials[0] = pair.lower;
+            subtract(simd, samples, coefficients[0], &pair.lower);
+            pair.raise_lower(simd);
+            polynomials[1] = pair.upper;
+            subtract(simd, samples, coefficients[1], &pair.upper);
+            pair.raise_upper(simd);
+        }
+        if let ([polynomial], [coefficient]) = (last_polynomial, last_coefficient) {
+            *polynomial = pair.lower;
+            subtract(simd, samples, *coefficient, &pair.lower);
         }
         let mut weighted = *samples;
         for n in 0..N {
             weighted[n] = simd.mul_f64s(samples[n], weights[n]);
             self.square = simd.mul_add_f64s(weighted[n], samples[n], self.square);
         }
-        for k in 0..degrees {
-            let mut product = self.products.0[k];
-            for (polynomial, sample) in self.polynomials.0[k].iter().zip(&weighted) {
-                product = simd.mul_add_f64s(*polynomial, *sample, product);
-            }
-            self.products.0[k] = product;
+        for (product, polynomial) in self.products.0.iter_mut().zip(&self.polynomials.0).take(degrees) {
+            add_products(simd, product, polynomial, &weighted);
         }
+    }
+}
+
+#[inline(always)]
+fn subtract<S: Lanes, const N: usize>(
+    simd: S,
+    samples: &mut [S::f64s; N],
+    coefficient: S::f64s,
+    polynomial: &[S::f64s; N],
+) {
+    for (sample, value) in samples.iter_mut().zip(polynomial) {
+        *sample = simd.negate_mul_add_f64s(coefficient, *value, *sample);
     }
 }
 

@@ -8,7 +8,7 @@ use std::array::from_fn;
 
 use crate::irregular::order_table::{OrderTable, TableColumns};
 use crate::irregular::shared_buffers::{GroupSamples, SlidSums};
-use crate::irregular::shared_choice::{OrderResiduals, OrderShares, SharedChoice, sums, turned};
+use crate::irregular::shared_choice::{OrderResiduals, OrderShares, SharedChoice, sums};
 use crate::irregular::shared_factor::{DERIVATIVES, SharedFactor};
 use crate::irregular::shared_sums::{MOST, at};
 use crate::irregular::window_estimates::{WindowFit, WindowFits};
@@ -177,15 +177,15 @@ impl WindowsAbreast<'_, '_> {
         let zero = simd.splat_f64s(0.0);
         at(simd, degrees, simd.load(&abreast.time, 0), &mut polynomials.0[..wanted]);
         let before = sums(simd, degrees, &polynomials.0[..wanted], &window.coefficients.0);
-        factor.set_below(degrees, 0, &window.left.products.0);
-        for (derivative, row) in polynomials.0.iter().take(if errors { wanted } else { 0 }).enumerate() {
-            factor.set_below(degrees, 2 + derivative, row);
+        factor.below.0[0] = window.left.products.0;
+        if errors {
+            factor.below.0[2..2 + wanted].copy_from_slice(&polynomials.0[..wanted]);
         }
         factor.decompose(simd, degrees, &window.left.moments.0, if errors { 2 + wanted } else { 2 });
-        let own = &factor.rows.0[degrees];
+        let own = &factor.below.0[0];
         let (mut residual, mut far, mut rounded) = (window.square, zero, zero);
         for (k, (&left, &inverse)) in own.iter().zip(&factor.inverse.0).enumerate().take(degrees) {
-            let end = factor.rows.0[degrees + 1][k];
+            let end = factor.below.0[1][k];
             residual = simd.negate_mul_add_f64s(simd.mul_f64s(left, left), inverse, residual);
             far = simd.mul_add_f64s(simd.mul_f64s(end, end), inverse, far);
             rounded = simd.mul_add_f64s(window.tails.0[k], inverse, rounded);
@@ -195,7 +195,7 @@ impl WindowsAbreast<'_, '_> {
         // What each order leaves asks for the polynomial that was taken off, too.
         let is_fixed = matches!(self.fit.order, Order::Fixed(_));
         if errors || !is_fixed {
-            turned(simd, degrees, factor, &window.coefficients.0, &mut off.0);
+            factor.turned(simd, degrees, &window.coefficients.0, &mut off.0);
             for (coefficient, (&off, &own)) in coefficients.0.iter_mut().zip(off.0.iter().zip(own)).take(degrees) {
                 *coefficient = simd.add_f64s(off, own);
             }
@@ -285,9 +285,9 @@ impl FoundAbreast {
         before: &[S::f64s],
     ) {
         let degrees = residuals.degrees;
-        let own = &factor.rows.0[degrees];
+        let own = &factor.below.0[0];
         for (derivative, &before) in before.iter().enumerate() {
-            let row = &factor.rows.0[degrees + 2 + derivative];
+            let row = &factor.below.0[2 + derivative];
             let mut full = before;
             for ((polynomial, inverse), own) in row.iter().zip(&factor.inverse.0).zip(own).take(degrees) {
                 full = simd.mul_add_f64s(simd.mul_f64s(*polynomial, *inverse), *own, full);
