@@ -135,9 +135,9 @@ fn with_constants(model: &Model) -> Model {
     }
     let (constant, windowed): (Vec<_>, Vec<_>) = model.windowed.iter().partition(|&&index| index < 2);
     if constant.is_empty() {
-        return Model { constant: windowed, windowed: Vec::new(), linear: model.linear };
+        return Model { constant: windowed, windowed: Vec::new(), ..model.clone() };
     }
-    Model { constant, windowed, linear: model.linear }
+    Model { windowed, constant, ..model.clone() }
 }
 
 /// Blocks of rows: of a length in samples, or so many of a record.

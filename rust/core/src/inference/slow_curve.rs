@@ -22,6 +22,21 @@ impl Varying {
         interpolate(points, (row - first) / self.spacing, self.spacing)
     }
 
+    /// Its mean, each point counting as much as it is known.
+    pub(crate) fn mean(&self, coefficient: usize) -> f64 {
+        let points = self.values[coefficient].iter().zip(&self.variances[coefficient]);
+        let [sum, weights] = points.fold([0.0; 2], |[sum, weights], (value, variance)| {
+            let weight = if *variance > 0.0 { variance.recip() } else { 0.0 };
+            [sum + weight * value, weights + weight]
+        });
+        if weights > 0.0 { sum / weights } else { 0.0 }
+    }
+
+    /// Coefficients by their regressors, each by its mean.
+    pub(crate) fn levels(&self, regressors: &[usize]) -> Vec<(usize, f64)> {
+        regressors.iter().enumerate().map(|(coefficient, &one)| (one, self.mean(coefficient))).collect()
+    }
+
     /// The first rows of stretches, but for the first stretch.
     pub(crate) fn breaks(&self) -> Vec<usize> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rows")]
@@ -87,6 +102,17 @@ mod tests {
             assert!((value - (3.0 - 0.5 * row + 0.02 * row * row)).abs() < 1e-12);
             assert!((slope - (-0.5 + 0.04 * row)).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn a_mean_counts_points_as_much_as_they_are_known() {
+        // Zero to eight, the ends known a ninth as well as the others.
+        let curve = curve(|row| row / 4.0);
+        assert!((curve.mean(0) - 4.0).abs() < 1e-12);
+        let mut uneven = curve.clone();
+        uneven.variances[0] = vec![1.0; 9];
+        uneven.variances[0][8] = f64::INFINITY;
+        assert_eq!(uneven.levels(&[7]), [(7, 3.5)]);
     }
 
     #[test]

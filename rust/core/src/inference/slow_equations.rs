@@ -17,6 +17,9 @@ use crate::simd::vectors::dispatch;
 /// Coefficients of the polynomials in time.
 pub(crate) const QUADRATIC: usize = 3;
 
+/// The part that an equation counts at least whose regressor is nothing but noise: its error is larger than anything.
+const LEAST: f64 = 1e-3;
+
 /// The equations that windows leave for slow coefficients, which come first among their constants.
 pub(crate) struct Slow<'a> {
     pub(crate) fit: &'a Fit,
@@ -110,10 +113,39 @@ impl Slow<'_> {
         })
     }
 
+    /// The part of an equation of every window that counts: where its regressor is mostly the angle's noise once windowed ones are eliminated, the
+    /// removal of that noise is bounded, and what is left draws coefficients to zero.
+    fn told(&self, problem: &Problem<'_>, equation: usize) -> Vec<f64> {
+        let full = &self.fit.full;
+        let (fields, layout) = (full.fields, full.fields.layout);
+        let of = |window: usize| {
+            let factors: Vec<f64> =
+                (0..layout.windowed).map(|one| full.field(fields.solution(one, equation))[window]).collect();
+            let noise = problem.noise.without_windowed(layout, equation, &factors);
+            let left = full.field(fields.left(equation, equation))[window];
+            [left * left, noise.max(0.0) * full.field(fields.count())[window]]
+        };
+        let sums: Vec<[f64; 2]> = std::iter::once([0.0; 2])
+            .chain((0..full.len()).map(|window| if is_determined(full, window) { of(window) } else { [0.0; 2] }))
+            .scan([0.0; 2], |sum, [left, noise]| {
+                *sum = [sum[0] + left, sum[1] + noise];
+                Some(*sum)
+            })
+            .collect();
+        let near = self.fit.span.div_ceil(self.fit.step);
+        let part = |window: usize| {
+            let (first, end) = (window.saturating_sub(near), (window + near + 1).min(full.len()));
+            let [left, noise] = [0, 1].map(|which| sums[end][which] - sums[first][which]);
+            if noise > 0.0 { ((2.0 * left - noise) / (2.0 * left + noise)).max(LEAST) } else { 1.0 }
+        };
+        (0..full.len()).map(part).collect()
+    }
+
     /// The equations of every stretch, the same for every reach.
-    pub(crate) fn equations(&self) -> Vec<Triangles> {
+    pub(crate) fn equations(&self, problem: &Problem<'_>) -> Vec<Triangles> {
         let full = &self.fit.full;
         let all = full.fields.layout.constant;
+        let told: Vec<Vec<f64>> = (0..all).map(|equation| self.told(problem, equation)).collect();
         let windows: Vec<(usize, f64)> = (0..full.len())
             .filter(|&window| is_determined(full, window))
             .map(|window| (window, self.fit.centre(window)))
@@ -125,6 +157,7 @@ impl Slow<'_> {
                 let root = self.weights[window].sqrt();
                 let rows = found.push(row, root > 0.0);
                 for (i, of_row) in rows.chunks_exact_mut(all + 1).enumerate() {
+                    let root = root * told[i][window].sqrt();
                     for (j, entry) in of_row.iter_mut().enumerate().take(all).skip(i) {
                         *entry = root * full.field(full.fields.left(i, j))[window];
                     }
@@ -148,55 +181,113 @@ fn fill(values: &[Option<f64>]) -> Option<Vec<f64>> {
 /// Squared errors over the noise variance are clipped to this, so that single rows do not dominate.
 const MOST: f64 = 25.0;
 
+/// How well slow coefficients predict rows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Prediction {
+    /// Mean squared error over the noise's variance.
+    pub(crate) error: f64,
+    /// By how much of its variance the noise of a row is more than expected, with the coefficients that were found.
+    pub(crate) excess: f64,
+}
+
 impl Slow<'_> {
-    /// Mean squared error of predicting rows, over the noise's variance: slow coefficients from equations without the row,
-    /// windowed ones from windows on both sides of it.
+    /// Mean squared error of predicting rows, over the noise's variance: slow coefficients from equations without the row, windowed ones from windows
+    /// on both sides of it. The angle's noise in a row grows with the coefficients: each square counts as if that were the expected noise, or
+    /// the smallest coefficients would predict best. More than twice that noise excuses no error.
     pub(crate) fn error(
         &self,
         problem: &Problem<'_>,
         leave_gap_out: &Varying,
         full: &Varying,
         scale: Scale,
-        variance: f64,
-    ) -> f64 {
-        let Some(solved) = &self.fit.leave_gap_out else { return f64::INFINITY };
-        let (fields, layout) = (solved.fields, problem.layout);
-        let (mut sum, mut count) = (0.0, 0.0);
-        let mut constants = vec![0.0; layout.constant];
-        constants[self.coefficients..].copy_from_slice(&leave_gap_out.constants);
+        expected: Expected,
+    ) -> Prediction {
+        let nothing = Prediction { error: f64::INFINITY, excess: 0.0 };
+        let Some(solved) = &self.fit.leave_gap_out else { return nothing };
+        let is_noisy = !problem.noise.is_zero();
+        let usual = expected.variance - expected.torque;
+        let levels: Vec<f64> =
+            (0..self.coefficients).map(|one| self.current.map_or(0.0, |current| current.mean(one))).collect();
+        let (mut sum, mut excess, mut count) = (0.0, 0.0, 0.0);
+        let mut factors = Vec::new();
+        let mut constants = [leave_gap_out, full].map(|curve| {
+            let mut constants = vec![0.0; problem.layout.constant];
+            constants[self.coefficients..].copy_from_slice(&curve.constants);
+            constants
+        });
         for row in (0..self.rows).filter(|&row| problem.usable[row]) {
             let cell = scale.cell(row);
             let Some(place) = solved.place(cell).filter(|&place| is_determined(solved, place)) else { continue };
             let mut error = problem.rhs[row];
-            for (coefficient, companion) in self.companions.iter().enumerate() {
-                let (mut value, mut slope) =
-                    (leave_gap_out.at(coefficient, row as f64).0, full.at(coefficient, row as f64).1);
-                if let Some(current) = self.current {
-                    let (taken, rate) = current.at(coefficient, row as f64);
-                    (value, slope) = (value - taken, slope - rate);
-                }
-                constants[coefficient] = value;
-                error -= slope / problem.period * companion[row];
+            let taken = |one: usize| self.current.map_or((0.0, 0.0), |current| current.at(one, row as f64));
+            for (one, companion) in self.companions.iter().enumerate() {
+                let ((value, rate), (of_all, slope)) = (taken(one), full.at(one, row as f64));
+                constants[0][one] = leave_gap_out.at(one, row as f64).0 - value;
+                constants[1][one] = of_all - value;
+                error -= (slope - rate) / problem.period * companion[row];
             }
-            for (constant, column) in constants.iter().zip(&problem.constants) {
+            for (constant, column) in constants[0].iter().zip(&problem.constants) {
                 error -= constant * column[row];
             }
             let later = (row as f64 - scale.centres(cell)[1]) * problem.period;
-            for unknown in 0..layout.local() {
-                let mut value = solved.field(fields.solution(unknown, layout.constant))[place];
-                for (constant, factor) in constants.iter().enumerate() {
-                    value -= solved.field(fields.solution(unknown, constant))[place] * factor;
-                }
-                error -= value
-                    * match unknown.checked_sub(layout.windowed) {
-                        None => problem.windowed[unknown][row],
-                        Some(slope) => problem.companions[slope][row] + later * problem.windowed[slope][row],
-                    };
+            let beside = AtRow { solved, place, row, later };
+            error -= beside.predicted(problem, &constants[0]);
+            let mut square = error * error;
+            if is_noisy {
+                let more = constants.each_ref().map(|constants| {
+                    beside.factors(problem, constants, &mut factors);
+                    let slow = (0..self.coefficients).map(|one| constants[one] + taken(one).0 - levels[one]);
+                    factors.extend(slow.chain(constants[self.coefficients..].iter().copied()));
+                    factors.push(-1.0);
+                    (problem.noise.variance(&factors) - usual).min(usual)
+                });
+                square -= more[0];
+                excess += more[1] / expected.variance;
             }
-            sum += (error * error / variance).min(MOST);
+            sum += (square / expected.variance).min(MOST);
             count += 1.0;
         }
-        if count > 0.0 { sum / count } else { f64::INFINITY }
+        if count > 0.0 { Prediction { error: sum / count, excess: excess / count } } else { nothing }
+    }
+}
+
+/// The windows on both sides of a row, which lies so many seconds after their middle.
+struct AtRow<'a> {
+    solved: &'a Solved,
+    place: usize,
+    row: usize,
+    later: f64,
+}
+
+impl AtRow<'_> {
+    /// A windowed coefficient at the middle, or its growth.
+    fn local(&self, unknown: usize, constants: &[f64]) -> f64 {
+        crate::regression::solved::local(self.solved, self.place, constants, unknown)
+    }
+
+    /// What windowed coefficients make of the row.
+    fn predicted(&self, problem: &Problem<'_>, constants: &[f64]) -> f64 {
+        let &Self { row, later, .. } = self;
+        let of = |unknown: usize| {
+            self.local(unknown, constants)
+                * match unknown.checked_sub(problem.layout.windowed) {
+                    None => problem.windowed[unknown][row],
+                    Some(slope) => problem.companions[slope][row] + later * problem.windowed[slope][row],
+                }
+        };
+        (0..problem.layout.local()).map(of).sum()
+    }
+
+    /// By which windowed regressors and their companions count in it.
+    fn factors(&self, problem: &Problem<'_>, constants: &[f64], factors: &mut Vec<f64>) {
+        let windowed = problem.layout.windowed;
+        factors.clear();
+        factors.extend((0..windowed).map(|one| self.local(one, constants)));
+        for one in 0..windowed {
+            let slope = if problem.layout.linear { self.local(windowed + one, constants) } else { 0.0 };
+            factors[one] += self.later * slope;
+            factors.push(slope);
+        }
     }
 }
 
@@ -234,7 +325,7 @@ mod tests {
         let slow =
             Slow { fit: &fit, coefficients: 1, companions, current: None, weights: &ones, rows: ROWS, breaks: &[] };
         let [without, with] =
-            slow.fit(&slow.equations(), QUADRATIC, (reach, hole), Instructions::Scalar).expect("curves");
+            slow.fit(&slow.equations(&problem), QUADRATIC, (reach, hole), Instructions::Scalar).expect("curves");
         if hole > 0.0 { without } else { with }
     }
 

@@ -14,7 +14,7 @@ use crate::exec::stages::Stages;
 use crate::inference::constancy::BLOCKS;
 use crate::inference::cross_validation::{ComparedRows, best_length, rule_out};
 use crate::inference::slow_curve::Varying;
-use crate::inference::slow_equations::{QUADRATIC, Slow};
+use crate::inference::slow_equations::{Prediction, QUADRATIC, Slow};
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
@@ -39,8 +39,9 @@ const NO_BETTER: usize = 2;
 #[derive(Clone, Debug)]
 pub(crate) struct SlowCoefficients {
     pub(crate) varying: Varying,
-    /// The right-hand side without them.
+    /// The right-hand side without them, and what they take off it.
     pub(crate) rhs: Vec<f64>,
+    pub(crate) taken: Vec<(usize, f64)>,
     /// The length of windows with the smallest cross-validation error.
     pub(crate) scale: Scale,
     /// The length of the windows that left the equations for them.
@@ -72,6 +73,14 @@ pub(crate) struct SlowSearch<'a> {
     /// What errors of constants between jumps are multiplied by, in comparison with those of curves.
     pub(crate) simpler: f64,
     pub(crate) instructions: Instructions,
+}
+
+/// The curves of one bandwidth, without equations near each row and with all, and what noise is more with them than expected.
+struct BestCurve {
+    terms: usize,
+    curves: [Varying; 2],
+    reach: f64,
+    excess: f64,
 }
 
 /// Few of many rows, and how many of the shortest lengths of windows they hold.
@@ -108,6 +117,51 @@ impl SlowSearch<'_> {
         };
         best_length(problem, (scales, &left), expected, instructions, stages)
     }
+
+    /// The curves of the bandwidth that predicts best, or the first one where nothing is compared.
+    fn best_curve(
+        &self,
+        equations: &Slow<'_>,
+        problem: &Problem<'_>,
+        (scale, compares): (Scale, bool),
+        (reaches, last): (&[f64], Option<f64>),
+    ) -> Option<BestCurve> {
+        let &Self { expected, simpler, instructions, .. } = self;
+        let triangles = equations.equations(problem);
+        let mut best: Option<BestCurve> = None;
+        let mut least = f64::INFINITY;
+        let mut consider = |terms: usize, reach: f64| {
+            if best.is_some() && !compares {
+                return false;
+            }
+            let fitted = equations.fit(&triangles, terms, (reach, hole(scale)), instructions);
+            let Some(curves) = fitted else { return false };
+            let Prediction { error, excess } = equations.error(problem, &curves[0], &curves[1], scale, expected);
+            let counts = if terms == 1 { simpler * error } else { error };
+            let is_better = best.is_none() || counts < least;
+            if is_better {
+                least = counts;
+                best = Some(BestCurve { terms, curves, reach, excess });
+            }
+            is_better
+        };
+        outward(reaches, last, |reach| consider(QUADRATIC, reach));
+        // Between jumps a coefficient may be constant.
+        if !self.breaks.is_empty() {
+            consider(1, 2.0 * self.rows.len() as f64);
+        }
+        best
+    }
+}
+
+/// Rows on either side that a prediction leaves out.
+fn hole(scale: Scale) -> f64 {
+    (scale.span() / 2 + scale.reach) as f64
+}
+
+/// Bandwidths that fit into so many rows.
+fn reaches(scale: Scale, whole: f64) -> Vec<f64> {
+    REACHES.iter().map(|multiple| multiple * hole(scale)).take_while(|reach| 2.0 * reach <= whole).collect()
 }
 
 /// Estimates slow coefficients, or returns `None` if they are not determined. `first` is the length of windows to begin with.
@@ -116,7 +170,7 @@ pub(crate) fn find(
     first: Scale,
     stages: &mut Stages<'_, '_>,
 ) -> Result<Option<SlowCoefficients>, Error> {
-    let &SlowSearch { rows, model, coefficients, noise, expected, scales, breaks, simpler, instructions } = search;
+    let &SlowSearch { rows, model, coefficients, noise, expected, scales, breaks, instructions, .. } = search;
     let slow = &model.constant[..coefficients];
     let rest = Model { constant: model.constant[coefficients..].to_vec(), ..model.clone() };
     let whole = rows.len() as f64;
@@ -134,6 +188,8 @@ pub(crate) fn find(
     for round in 1..=ROUNDS {
         let current = found.as_ref().map(|found| &found.varying);
         let rhs = found.as_ref().map_or_else(|| rows.rhs.clone(), |found| found.rhs.clone());
+        let taken = found.as_ref().map_or_else(Vec::new, |found| found.taken.clone());
+        let model = Model { taken, ..model.clone() };
         let problem = model.problem(rows, &rhs, noise, None);
         // Windows on both sides of a row that are too short to predict it compare nothing: the first bandwidth stands.
         let compares = scale.predicts(problem.layout);
@@ -147,52 +203,41 @@ pub(crate) fn find(
         let weights = if current.is_some() { &fit.pooled.weights } else { &ones };
         let companions = slow.iter().map(|&one| rows.regressors[one].companion.as_slice()).collect();
         let equations = Slow { fit: &fit, coefficients, companions, current, weights, rows: rows.len(), breaks };
-        let hole = (scale.span() / 2 + scale.reach) as f64;
-        let reaches: Vec<f64> =
-            REACHES.iter().map(|multiple| multiple * hole).take_while(|reach| 2.0 * reach <= whole).collect();
-        let triangles = equations.equations();
-        let mut best: Option<(usize, [Varying; 2], f64)> = None;
-        let mut least = f64::INFINITY;
-        let mut consider = |terms: usize, reach: f64| {
-            if best.is_some() && !compares {
-                return false;
-            }
-            let fitted = equations.fit(&triangles, terms, (reach, hole), instructions);
-            let Some([leave_gap_out, full]) = fitted else { return false };
-            let error = equations.error(&problem, &leave_gap_out, &full, scale, expected.variance);
-            let counts = if terms == 1 { simpler * error } else { error };
-            let is_better = best.is_none() || counts < least;
-            if is_better {
-                least = counts;
-                best = Some((terms, [leave_gap_out, full], reach));
-            }
-            is_better
-        };
-        outward(&reaches, last, |reach| consider(QUADRATIC, reach));
-        // Between jumps a coefficient may be constant.
-        if !breaks.is_empty() {
-            consider(1, 2.0 * whole);
-        }
-        let Some((terms, [leave_gap_out, varying], reach)) = best else { return Ok(None) };
+        let reaches = reaches(scale, whole);
+        let best = search.best_curve(&equations, &problem, (scale, compares), (&reaches, last));
+        let Some(BestCurve { terms, curves: [leave_gap_out, varying], reach, excess }) = best else { return Ok(None) };
         last = (terms > 1).then_some(reach);
         if last.is_some() && last == reaches.first().copied() {
             // Shorter bandwidths need shorter windows.
             most = most.min(scale.span() / 2);
         }
         let rhs = without(rows, &rows.rhs, slow, &varying);
+        let taken = varying.levels(slow);
+        let rest = Model { taken: taken.clone(), ..rest.clone() };
         let problem = rest.problem(rows, &rhs, noise, None);
         let Some((best, error)) = search.best_length(&problem, &rest, &mut few, stages)? else { return Ok(None) };
+        let error = error - excess;
         let mut predicted = error;
         if round == ROUNDS && !rows.jumps.is_empty() {
             let rhs = without(rows, &rows.rhs, slow, &leave_gap_out);
             let problem = rest.problem(rows, &rhs, noise, None);
             let fit = Fit::with_leave_gap_out(&problem, best, expected, instructions, stages)?;
             let compared = ComparedRows::new(&problem, scales);
-            predicted = fit.map_or(f64::INFINITY, |fit| compared.error(&problem, best, &fit, expected.variance));
+            predicted =
+                fit.map_or(f64::INFINITY, |fit| compared.error(&problem, best, &fit, expected.variance)) - excess;
         }
         let reach = reach.min(whole / 2.0);
-        found =
-            Some(SlowCoefficients { varying, rhs, scale: best, equations_of: scale, error, predicted, reach, terms });
+        found = Some(SlowCoefficients {
+            varying,
+            rhs,
+            taken,
+            scale: best,
+            equations_of: scale,
+            error,
+            predicted,
+            reach,
+            terms,
+        });
         scale = shortened(best, most);
     }
     Ok(found)
@@ -233,8 +278,7 @@ pub(crate) fn followed(
     let (rows, breaks) = (rows.len(), found.varying.breaks());
     let equations =
         Slow { fit: &fit, coefficients, companions, current: None, weights: &weights, rows, breaks: &breaks };
-    let hole = (scale.span() / 2 + scale.reach) as f64;
-    let fitted = equations.fit(&equations.equations(), found.terms, (found.reach, hole), instructions);
+    let fitted = equations.fit(&equations.equations(&problem), found.terms, (found.reach, hole(scale)), instructions);
     Ok(fitted.map(|[_, full]| full))
 }
 

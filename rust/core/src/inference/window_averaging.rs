@@ -362,7 +362,7 @@ mod tests {
     }
 
     fn averaged_at(rows: &Rows, best: usize, wanted: Range<usize>) -> Averages {
-        let model = Model { windowed: vec![0], constant: Vec::new(), linear: true };
+        let model = Model { windowed: vec![0], constant: Vec::new(), linear: true, ..Model::default() };
         let covariance = RowCovariance::by_distance(vec![DEVIATION * DEVIATION]);
         let correlated = staged(|stages| model.correlated(rows, &covariance, stages));
         let problem = model.problem(rows, &rows.rhs, 0.0, Some(&correlated));

@@ -213,8 +213,8 @@ mod tests {
     fn models() -> [Model; 3] {
         [
             model(),
-            Model { windowed: vec![0], constant: vec![], linear: true },
-            Model { windowed: vec![0, 1], constant: vec![2], linear: false },
+            Model { windowed: vec![0], constant: vec![], linear: true, ..Model::default() },
+            Model { windowed: vec![0, 1], constant: vec![2], linear: false, ..Model::default() },
         ]
     }
 
@@ -322,7 +322,7 @@ mod tests {
     #[test]
     fn a_summary_is_solved_at_the_time_that_is_asked_for_and_written_where_it_belongs() {
         let (rows, step, count) = (rows(ROWS, |time| [1.0 + 0.1 * time, 0.1], 0.3), 20, 6);
-        let model = Model { windowed: vec![0], constant: vec![], linear: true };
+        let model = Model { windowed: vec![0], constant: vec![], linear: true, ..Model::default() };
         let problem = model.problem(&rows, &rows.rhs, 0.0, None);
         for instructions in Instructions::available() {
             let table = summarised(&problem, step, 0, count, instructions);

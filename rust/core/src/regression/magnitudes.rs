@@ -113,7 +113,7 @@ mod tests {
         let torque = (9.0 + CONSTANTS.iter().map(|value| value * value).sum::<f64>()).sqrt();
         assert_near(magnitudes(&offset, &model(), &[2.0, 0.0])[0], TELLS_NOTHING * torque, 0.05);
         // An offset that is windowed itself may be as large as the rest.
-        let windowed = Model { windowed: vec![0, 2], constant: vec![1], linear: false };
+        let windowed = Model { windowed: vec![0, 2], constant: vec![1], linear: false, ..Model::default() };
         assert_near(magnitudes(&offset, &windowed, &[2.0])[1], TELLS_NOTHING * torque, 0.05);
         // Without one the mean is a torque as any other.
         rows.rhs.iter_mut().for_each(|torque| *torque += 100.0);

@@ -11,12 +11,14 @@ use crate::regression::problem::{Correlated, Problem};
 use crate::regression::row_covariance::RowCovariance;
 
 /// The regressors of the rows, by the kind of their coefficients.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Model {
     pub(crate) windowed: Vec<usize>,
     pub(crate) constant: Vec<usize>,
     /// Whether windowed coefficients may grow linearly within a window.
     pub(crate) linear: bool,
+    /// Regressors that were taken off the right-hand side, and by which coefficient about: it has their noise.
+    pub(crate) taken: Vec<(usize, f64)>,
 }
 
 impl Model {
@@ -69,7 +71,7 @@ impl Model {
             jumps: &rows.jumps,
             period: rows.period,
             roots: &rows.roots,
-            noise: self.row_noise(rows, &rows.rhs_noise, noise),
+            noise: self.row_noise(rows, &self.rhs_noise(rows), noise),
         }
     }
 
@@ -83,14 +85,21 @@ impl Model {
         noise: f64,
     ) -> Problem<'a> {
         let rest = Self { constant: Vec::new(), ..self.clone() };
-        let mut rhs_noise = rows.rhs_noise.clone();
-        for (&regressor, constant) in self.constant.iter().zip(constants) {
-            let kernel = &rows.regressors[regressor].noise[0];
-            rhs_noise.resize(rhs_noise.len().max(kernel.len()), 0.0);
-            rhs_noise.iter_mut().zip(kernel).for_each(|(sum, value)| *sum -= constant * value);
-        }
-        let noise = rest.row_noise(rows, &rhs_noise, noise);
+        let mut without = self.clone();
+        without.taken.extend(self.constant.iter().copied().zip(constants.iter().copied()));
+        let noise = rest.row_noise(rows, &without.rhs_noise(rows), noise);
         Problem { layout: rest.layout(), constants: Vec::new(), rhs, noise, ..whole.clone() }
+    }
+
+    /// The noise of the angle in the right-hand side.
+    fn rhs_noise(&self, rows: &Rows) -> Vec<f64> {
+        let mut noise = rows.rhs_noise.clone();
+        for &(regressor, factor) in &self.taken {
+            let kernel = &rows.regressors[regressor].noise[0];
+            noise.resize(noise.len().max(kernel.len()), 0.0);
+            noise.iter_mut().zip(kernel).for_each(|(sum, value)| *sum -= factor * value);
+        }
+        noise
     }
 
     fn row_noise(&self, rows: &Rows, rhs: &[f64], noise: f64) -> RowNoise {
@@ -121,12 +130,38 @@ mod tests {
     #[test]
     fn a_problem_has_the_columns_of_its_unknowns() {
         let rows = rows(9, |_| [1.0, 0.0], 0.0);
-        let model = Model { windowed: vec![2], constant: vec![0], linear: false };
+        let model = Model { windowed: vec![2], constant: vec![0], linear: false, ..Model::default() };
         let problem = model.problem(&rows, &rows.rhs, 0.0, None);
         assert_eq!(problem.windowed, [rows.regressors[2].value.as_slice()]);
         assert_eq!(problem.companions, [rows.regressors[2].companion.as_slice()]);
         assert_eq!(problem.constants, [rows.regressors[0].value.as_slice()]);
         assert!(problem.noise.is_zero());
+    }
+
+    #[test]
+    fn what_was_taken_off_leaves_its_noise() {
+        let mut rows = rows(60, |time| [1.0 + 0.1 * time, 0.1], 0.3);
+        for (index, regressor) in rows.regressors.iter_mut().enumerate() {
+            regressor.noise = [vec![1.0, index as f64, 0.5], vec![0.0, 1.0, -1.0]];
+        }
+        let whole = model();
+        let problem = whole.problem(&rows, &rows.rhs, 0.01, None);
+        let rhs = without_constants(&problem, &CONSTANTS);
+        let taken: Vec<_> = whole.constant.iter().copied().zip(CONSTANTS).collect();
+        let rest = Model { constant: Vec::new(), taken, ..whole.clone() }.problem(&rows, &rhs, 0.01, None);
+        // The constants beside what was taken of them are zero, and a row's noise is the same.
+        let beside = Model { taken: whole.constant.iter().copied().zip(CONSTANTS).collect(), ..whole.clone() };
+        let beside = beside.problem(&rows, &rhs, 0.01, None);
+        let known = whole.without_constants(&rows, &problem, &rhs, &CONSTANTS, 0.01);
+        let columns = |problem: &Problem<'_>| 2 * problem.layout.windowed + problem.layout.constant + 1;
+        let of = |problem: &Problem<'_>| {
+            let mut factors = vec![0.0; columns(problem)];
+            (factors[0], factors[columns(problem) - 1]) = (2.0, -1.0);
+            problem.noise.variance(&factors)
+        };
+        assert_near(of(&rest), of(&known), 1e-12);
+        assert_near(of(&beside), of(&known), 1e-12);
+        assert!((of(&rest) / problem.noise.variance(&[2.0, 0.0, 0.0, 0.0, -1.0]) - 1.0).abs() > 0.1);
     }
 
     #[test]

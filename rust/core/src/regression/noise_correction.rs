@@ -37,6 +37,22 @@ impl RowNoise {
         Packet::splat(self.gram[i * self.size + j])
     }
 
+    /// The variance of the noise in one row of all columns, each times a factor.
+    pub(crate) fn variance(&self, factors: &[f64]) -> f64 {
+        let each = || factors.iter().enumerate().filter(|(_, factor)| **factor != 0.0);
+        each().map(|(i, a)| a * each().map(|(j, b)| b * self.gram[i * self.size + j]).sum::<f64>()).sum()
+    }
+
+    /// The variance in one row of the noise of a constant regressor less windowed regressors times some factors.
+    pub(crate) fn without_windowed(&self, layout: Layout, constant: usize, factors: &[f64]) -> f64 {
+        let at = |i: usize, j: usize| self.gram[i * self.size + j];
+        let own = 2 * layout.windowed + constant;
+        let each = || factors.iter().enumerate();
+        let beside = each().map(|(j, factor)| factor * at(own, j)).sum::<f64>();
+        let squared = each().flat_map(|(i, a)| each().map(move |(j, b)| a * b * at(i, j))).sum::<f64>();
+        at(own, own) - 2.0 * beside + squared
+    }
+
     /// What the noise adds to entry `(i, j)` of the normal matrix, the right-hand side being the last column.
     #[inline(always)]
     pub(crate) fn expected(&self, layout: Layout, summary: &[Packet], i: usize, j: usize) -> Packet {
@@ -194,6 +210,22 @@ mod tests {
             own + if column == 1 { row as f64 * KERNELS[0][k] } else { 0.0 }
         };
         (0..ROWS).map(|row| (0..3).map(|k| variance * kernel(i, row, k) * kernel(j, row, k)).sum::<f64>()).sum()
+    }
+
+    #[test]
+    fn the_noise_of_a_combination_of_columns_is_that_of_their_kernels_combined() {
+        let noise = RowNoise::new(&KERNELS, 0.3);
+        let of = |factors: [f64; 4]| -> f64 {
+            let kernel = (0..3).map(|k| {
+                let each = KERNELS.iter().zip(factors);
+                each.map(|(kernel, factor)| factor * kernel.get(k).copied().unwrap_or(0.0)).sum::<f64>()
+            });
+            kernel.map(|value| 0.3 * value * value).sum()
+        };
+        for factors in [[1.0, 0.0, 0.0, 0.0], [0.5, -2.0, 3.0, -1.0], [0.0, 0.0, 2.0, 1.0]] {
+            assert_near(noise.variance(&factors), of(factors), ROUNDING);
+        }
+        assert_near(noise.without_windowed(LAYOUT, 0, &[0.7]), of([-0.7, 0.0, 1.0, 0.0]), ROUNDING);
     }
 
     #[test]

@@ -48,7 +48,7 @@ pub(crate) fn rows(count: usize, changing: impl Fn(f64) -> [f64; 2], deviation: 
 
 /// The model of these rows: what changes follows a line in every window.
 pub(crate) fn model() -> Model {
-    Model { windowed: vec![0], constant: vec![1, 2], linear: true }
+    Model { windowed: vec![0], constant: vec![1, 2], linear: true, ..Model::default() }
 }
 
 /// What independent rows with noise of some variance leave.

@@ -320,7 +320,7 @@ mod tests {
     #[test]
     fn windows_too_short_to_predict_a_row_determine_nothing_on_both_sides_of_one() {
         let rows = rows(120, |time| [time.sin(), time.cos()], 0.1);
-        let model = Model { windowed: vec![0, 1], constant: vec![2], linear: true };
+        let model = Model { windowed: vec![0, 1], constant: vec![2], linear: true, ..Model::default() };
         let problem = model.problem(&rows, &rows.rhs, 0.0, None);
         let scales = Scale::all(120, 2);
         let (mut short, mut long) = (0, 0);

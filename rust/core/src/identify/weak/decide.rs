@@ -155,7 +155,12 @@ impl Session<'_, '_, '_> {
             if model.windowed.is_empty() {
                 // Beside constants it is followed in windows, as a stiffness is.
                 let constant = model.constant.iter().copied().filter(|&one| one != worst).collect();
-                model = Cow::Owned(Model { windowed: vec![worst], constant, linear: self.options.linear });
+                model = Cow::Owned(Model {
+                    windowed: vec![worst],
+                    constant,
+                    linear: self.options.linear,
+                    taken: Vec::new(),
+                });
                 let before = decided.clone();
                 (decided.model, decided.white, decided.correlated) = (model.clone().into_owned(), None, None);
                 (decided.covariance, decided.expected) = self.covariance(&chosen.weak, chosen.parameters);
@@ -316,6 +321,7 @@ impl Session<'_, '_, '_> {
         decided.found = found;
         decided.fit = None;
         if let Some(found) = &decided.found {
+            decided.model.taken.clone_from(&found.taken);
             let problem = decided.problem(rows, self.noise[0]);
             let (scale, expected) = (Some(found.scale), decided.expected);
             let fit = Fit::new(&problem, scale, expected, instructions, &mut self.stages)?;

@@ -125,7 +125,7 @@ impl Session<'_, '_, '_> {
         let half = (typical as usize).min(samples / 16).max(chosen.weak.function.half_width());
         let function = TestFunction::new(half, chosen.weak.function.exponent(), self.options.delta)?;
         let constant = self.unknowns().into_iter().chain([self.rate()]).collect();
-        let model = Model { windowed: Vec::new(), constant, linear: self.options.linear };
+        let model = Model { constant, linear: self.options.linear, ..Model::default() };
         let (rate, may_change) = (model.constant.len() - 1, self.may_change());
         let start = self.record.lag;
         let mut lag = start;

@@ -52,7 +52,7 @@ pub(crate) fn spring(stiffness: impl Fn(usize) -> f64) -> Spring {
 /// What jumps are looked for in, for some work.
 pub(crate) fn searched<R>(spring: &Spring, work: impl FnOnce(&JumpSearch<'_>) -> R) -> R {
     let (rows, variance) = (&spring.rows, DEVIATION * DEVIATION);
-    let model = Model { windowed: vec![0], constant: Vec::new(), linear: true };
+    let model = Model { windowed: vec![0], constant: Vec::new(), linear: true, ..Model::default() };
     let covariance = RowCovariance::by_distance(vec![variance]);
     let correlated = staged(|stages| model.correlated(rows, &covariance, stages));
     let problem = model.problem(rows, &rows.rhs, 0.0, Some(&correlated));

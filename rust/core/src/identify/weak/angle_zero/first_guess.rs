@@ -22,7 +22,7 @@ struct InWindow {
 pub(crate) fn with_free_offset(model: &Model, offset: usize) -> Model {
     let constant = model.constant.iter().copied().filter(|&one| one != offset).collect();
     let windowed = model.windowed.iter().copied().chain([offset]).collect();
-    Model { windowed, constant, linear: model.linear }
+    Model { windowed, constant, ..model.clone() }
 }
 
 impl Session<'_, '_, '_> {
@@ -87,7 +87,7 @@ mod tests {
 
     #[test]
     fn an_offset_becomes_windowed_beside_what_is_windowed_already() {
-        let model = Model { windowed: vec![2], constant: vec![0, 1, 3, 4], linear: true };
+        let model = Model { windowed: vec![2], constant: vec![0, 1, 3, 4], linear: true, ..Model::default() };
         let free = with_free_offset(&model, 3);
         assert_eq!((free.windowed, free.constant), (vec![2, 3], vec![0, 1, 4]));
     }

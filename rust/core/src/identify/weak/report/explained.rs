@@ -120,7 +120,7 @@ impl Session<'_, '_, '_> {
     /// The part of a model that holds without any motion.
     fn still(&self, model: &Model) -> Model {
         let kept = |regressors: &[usize]| regressors.iter().copied().filter(|&one| self.is_still(one)).collect();
-        Model { windowed: kept(&model.windowed), constant: kept(&model.constant), linear: model.linear }
+        Model { windowed: kept(&model.windowed), constant: kept(&model.constant), ..model.clone() }
     }
 
     /// What a model leaves of the rows, each predicted from others where windows were compared by that, and which rows it predicts.
