@@ -108,7 +108,7 @@ impl Ends {
         let first = first_window(basis, record.len(), edge.end);
         let mut window = vec![0.0; basis.length()];
         record.read(first, &mut window);
-        let window = Window::project(basis, &window, self.floor);
+        let window = Window::project_while(basis, &window, self.floor, edge.go_on);
         self.write(basis, (window, first), edge, orders, estimates);
     }
 

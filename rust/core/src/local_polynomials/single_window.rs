@@ -4,11 +4,15 @@
 
 use pulp::Scalar;
 
+use crate::exec::pool::GoOn;
 use crate::lanes::interleaved::Strips;
 use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
 use crate::local_polynomials::sliding_projection::ROUNDING;
 use crate::record::samples::is_usable;
 use crate::simd::vectors::{Kernel, Lanes, MOST_LANES};
+
+/// After so many pairs of samples it is asked whether to go on: they take about a millisecond.
+const ASKED: usize = 1 << 16;
 
 /// The projection of one window.
 #[derive(Clone, Debug)]
@@ -26,10 +30,15 @@ pub(crate) struct Window {
 impl Window {
     /// Projects a window, or returns `None` if it holds an unusable sample. Residuals are at least `floor`.
     pub(crate) fn project(basis: &Basis, samples: &[f64], floor: f64) -> Option<Self> {
+        Self::project_while(basis, samples, floor, &|| true)
+    }
+
+    /// The same for windows of any length, asking repeatedly whether to go on; after `false` the projection is incomplete.
+    pub(crate) fn project_while(basis: &Basis, samples: &[f64], floor: f64, go_on: &GoOn<'_>) -> Option<Self> {
         if !samples.iter().all(|&value| is_usable(value)) {
             return None;
         }
-        let projected = project(Scalar::new(), basis, Places { samples, apart: 1 });
+        let projected = project(Scalar::new(), basis, Places { samples, apart: 1 }, go_on);
         let coefficients = projected.coefficients[..basis.degrees()].to_vec();
         Some(Self::new(projected.reference, coefficients, projected.residual, projected.energy, floor))
     }
@@ -82,7 +91,8 @@ impl Places<'_> {
 
 /// Projects one window in each lane.
 #[inline(always)]
-fn project<S: Lanes>(simd: S, basis: &Basis, samples: Places<'_>) -> WindowInEachLane<S> {
+fn project<S: Lanes>(simd: S, basis: &Basis, samples: Places<'_>, go_on: &GoOn<'_>) -> WindowInEachLane<S> {
+    let is_over = |row: usize| row % ASKED == ASKED - 1 && !go_on();
     let zero = simd.splat_f64s(0.0);
     let (half, odd) = (basis.length() / 2, basis.length() % 2);
     let reference = samples.at(simd, half);
@@ -91,6 +101,9 @@ fn project<S: Lanes>(simd: S, basis: &Basis, samples: Places<'_>) -> WindowInEac
     let coefficients = &mut all[..basis.degrees()];
     // The sample at the centre is the reference.
     for (row, q) in basis.rows().enumerate().skip(odd) {
+        if is_over(row) {
+            break;
+        }
         let (right, left) = samples.mirrored(simd, pair(row), reference);
         let parts = [simd.add_f64s(right, left), simd.sub_f64s(right, left)];
         for (j, (coefficient, value)) in coefficients.iter_mut().zip(q).enumerate() {
@@ -99,6 +112,9 @@ fn project<S: Lanes>(simd: S, basis: &Basis, samples: Places<'_>) -> WindowInEac
     }
     let (mut residual, mut energy) = (zero, zero);
     for (row, q) in basis.rows().enumerate() {
+        if is_over(row) {
+            break;
+        }
         let (right, left) = samples.mirrored(simd, pair(row), reference);
         let mut parts = [zero; 2];
         for (j, (coefficient, value)) in coefficients.iter().zip(q).enumerate() {
@@ -134,7 +150,8 @@ impl Kernel for WindowsOf<'_> {
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) -> Vec<Window> {
         let Self { basis, strips, first, floor } = self;
-        let projected = project(simd, basis, Places { samples: strips.rows_on_from(first), apart: strips.columns() });
+        let samples = Places { samples: strips.rows_on_from(first), apart: strips.columns() };
+        let projected = project(simd, basis, samples, &|| true);
         let mut numbers = [[0.0; MOST_LANES]; MOST_DEGREES + 3];
         let WindowInEachLane { reference, coefficients, residual, energy } = projected;
         for (numbers, vector) in numbers.iter_mut().zip([reference, residual, energy].iter().chain(&coefficients)) {
