@@ -120,6 +120,15 @@ mod tests {
     use crate::regression::solved::local;
     use crate::simd::instructions::Instructions;
 
+    /// Rows whose regressors have noise, each another.
+    fn noisy_rows() -> Rows {
+        let mut rows = rows(60, |time| [1.0 + 0.1 * time, 0.1], 0.3);
+        for (index, regressor) in rows.regressors.iter_mut().enumerate() {
+            regressor.noise = [vec![1.0, index as f64, 0.5], vec![0.0, 1.0, -1.0]];
+        }
+        rows
+    }
+
     #[test]
     fn unknowns_are_sorted_by_what_they_belong_to() {
         let model = Model::new(&[0, 2, 3, 5], [false, true, false, true].into_iter(), true);
@@ -140,17 +149,13 @@ mod tests {
 
     #[test]
     fn what_was_taken_off_leaves_its_noise() {
-        let mut rows = rows(60, |time| [1.0 + 0.1 * time, 0.1], 0.3);
-        for (index, regressor) in rows.regressors.iter_mut().enumerate() {
-            regressor.noise = [vec![1.0, index as f64, 0.5], vec![0.0, 1.0, -1.0]];
-        }
+        let rows = noisy_rows();
         let whole = model();
         let problem = whole.problem(&rows, &rows.rhs, 0.01, None);
         let rhs = without_constants(&problem, &CONSTANTS);
-        let taken: Vec<_> = whole.constant.iter().copied().zip(CONSTANTS).collect();
-        let rest = Model { constant: Vec::new(), taken, ..whole.clone() }.problem(&rows, &rhs, 0.01, None);
         // The constants beside what was taken of them are zero, and a row's noise is the same.
         let beside = Model { taken: whole.constant.iter().copied().zip(CONSTANTS).collect(), ..whole.clone() };
+        let rest = Model { constant: Vec::new(), ..beside.clone() }.problem(&rows, &rhs, 0.01, None);
         let beside = beside.problem(&rows, &rhs, 0.01, None);
         let known = whole.without_constants(&rows, &problem, &rhs, &CONSTANTS, 0.01);
         let columns = |problem: &Problem<'_>| 2 * problem.layout.windowed + problem.layout.constant + 1;
@@ -166,10 +171,7 @@ mod tests {
 
     #[test]
     fn windows_without_known_constants_have_the_same_numbers() {
-        let mut rows = rows(60, |time| [1.0 + 0.1 * time, 0.1], 0.3);
-        for (index, regressor) in rows.regressors.iter_mut().enumerate() {
-            regressor.noise = [vec![1.0, index as f64, 0.5], vec![0.0, 1.0, -1.0]];
-        }
+        let rows = noisy_rows();
         let model = model();
         // The noise of a constant's regressor is that of the right-hand side once it is taken off.
         for noise in [0.0, 0.01] {

@@ -155,12 +155,8 @@ impl Session<'_, '_, '_> {
             if model.windowed.is_empty() {
                 // Beside constants it is followed in windows, as a stiffness is.
                 let constant = model.constant.iter().copied().filter(|&one| one != worst).collect();
-                model = Cow::Owned(Model {
-                    windowed: vec![worst],
-                    constant,
-                    linear: self.options.linear,
-                    taken: Vec::new(),
-                });
+                let linear = self.options.linear;
+                model = Cow::Owned(Model { windowed: vec![worst], constant, linear, ..Model::default() });
                 let before = decided.clone();
                 (decided.model, decided.white, decided.correlated) = (model.clone().into_owned(), None, None);
                 (decided.covariance, decided.expected) = self.covariance(&chosen.weak, chosen.parameters);

@@ -11,7 +11,7 @@ use crate::identify::scanned::OTHER_CONSTANT;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::report::filter::{UNSURE, shared_noise};
 use crate::identify::weak::session::Session;
-use crate::inference::missing_terms::{CONSPICUOUS, Missing, Suspect};
+use crate::inference::missing_terms::{Missing, Suspect};
 use crate::regression::fit::Fit;
 use crate::regression::limits::{NEGLIGIBLE, NOISE_MODEL_FAILS};
 use crate::regression::model::Model;
@@ -147,23 +147,22 @@ impl Session<'_, '_, '_> {
                     suspect.error += lag.abs() * variance.sqrt();
                 }
             }
-            suspects.push((suspect, is_little));
+            suspects.push((place, suspect, is_little));
         }
-        if suspects.iter().any(|(one, _)| one.is_conspicuous()) {
+        if suspects.iter().any(|(_, one, _)| one.is_conspicuous()) {
             // A friction or a spring that is missing comes first: beside what it is not exactly all else is judged once it is in the equation.
-            let mean_square = |place: usize, value: f64| value * value * rows.mean_square_of(regressors.start + place);
+            let size = |place: usize, value: f64| value * value * rows.mean_square_of(regressors.start + place);
             let mut largest = 0.0_f64;
-            for (place, _) in candidates.iter().enumerate().filter(|(_, one)| matches!(one, Missing::Term(_))) {
-                let (value, index) = (beside.pooled.values[count + place], count + place);
-                let error = beside.variance_of(&problem, index, &covariance, &mut self.stages)?.sqrt();
-                if value.abs() > CONSPICUOUS * error {
-                    largest = largest.max(mean_square(place, value));
+            for (place, &missing) in candidates.iter().enumerate().filter(|(_, one)| matches!(one, Missing::Term(_))) {
+                let variance = beside.variance_of(&problem, count + place, &covariance, &mut self.stages)?;
+                let term = Suspect { missing, value: beside.pooled.values[count + place], error: variance.sqrt() };
+                if term.is_conspicuous() {
+                    largest = largest.max(size(place, term.value));
                 }
             }
-            let place_of = |missing: Missing| candidates.iter().position(|&one| one == missing).unwrap_or_default();
-            suspects.retain(|(one, _)| FAR_LARGER * mean_square(place_of(one.missing), one.value) > largest);
+            suspects.retain(|(place, one, _)| FAR_LARGER * size(*place, one.value) > largest);
         }
-        Ok(Some(suspects))
+        Ok(Some(suspects.into_iter().map(|(_, suspect, is_little)| (suspect, is_little)).collect()))
     }
 }
 
