@@ -5,6 +5,11 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
+
+import tvident
+from tvident import Status
+from tvident._identify.offered import can_be
 from tvident._identify.remedies import Trial
 
 AUTOMATIC = {"inertia": "auto", "damping": "auto", "stiffness": "windowed"}
@@ -20,6 +25,7 @@ def tried(suspects: list[str], *, there: set[str], beyond_chance: list[str]) -> 
         stages[given["damping"]].append(change)
         is_there = change in there and given["damping"] == "constant"
         return SimpleNamespace(
+            record_status=Status.TERM_SUSPECTED,
             settings={"lag": 1.0 if is_there else 0.0, "lag_stderr": 0.1},
             value=lambda name: (1.0, 0.1) if name == change and is_there else (0.0, 0.1),
         )
@@ -37,3 +43,14 @@ def test_all_are_tried_beside_constants_and_few_beside_what_changes() -> None:
     assert tried(suspects, there=set(), beyond_chance=["cubic"]) == [suspects, ["cubic", "lag"]]
     assert tried(suspects, there={"coulomb"}, beyond_chance=[]) == [suspects, ["lag", "coulomb"]]
     assert tried(suspects, there={"lag", "preload"}, beyond_chance=["preload"]) == [suspects, ["lag", "preload"]]
+
+
+def test_friction_that_drives_the_motion_is_none() -> None:
+    rig = tvident.simulate_torsional_rig(pattern="constant", seed=1)
+    velocity = np.gradient(rig.angle, rig.time)
+    for factor in (0.05, -0.05):
+        torque = rig.torque + factor * np.sign(velocity)
+        found = tvident.identify(rig.angle, torque, sample_rate=1000.0, terms=["offset", "coulomb"], method="auto")
+        assert found.value("coulomb").value * factor > 0
+        assert can_be("coulomb", found) == (factor > 0)
+        assert can_be("offset", found)

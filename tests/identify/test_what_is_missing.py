@@ -202,12 +202,14 @@ def test_damping_that_differs_between_the_directions_is_named(seed: int, asymmet
         assert better.value(name).value == pytest.approx(true, rel=0.01), name
 
 
-def test_numbers_in_advice_are_those_that_the_better_equation_finds() -> None:
-    """What is told of a term was what all constants find, 17 N m/rad^3 of 30."""
+def test_numbers_in_advice_are_those_that_the_better_equation_finds(tried: list[dict[str, object]]) -> None:
+    """What is told of a term was what all constants find, 17 N m/rad^3 of 30. Once it leaves nothing the others are not tried."""
     angle, torque = record(1, hardening=30)
     first = tvident.identify(angle, torque, sample_rate=RATE).advice[0]
     told = re.search(r"by ([\d.]+) ± ([\d.]+) N m/rad\^3", first)
     assert told is not None
+    windowed = [call["terms"] for call in tried if call["stiffness"] == "windowed"]
+    assert windowed and all(terms == ["offset", "cubic"] for terms in windowed)  # noqa: PT018
     better = tvident.identify(angle, torque, sample_rate=RATE, terms=["offset", "cubic"]).value("cubic")
     assert float(told[1]) == pytest.approx(better.value, abs=better.stderr)
     assert abs(better.value - 30) <= 4 * better.stderr

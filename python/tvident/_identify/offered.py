@@ -27,14 +27,15 @@ def is_there(name: str, found: Identification) -> bool:
         value, error = found.settings["lag"], found.settings.get("lag_stderr") or 0.0
     else:
         value, error, *_ = found.value(name)
-    return bool(abs(value) > BEYOND_CHANCE * error and _is_physical(name, value, found))
+    return bool(abs(value) > BEYOND_CHANCE * error) and can_be(name, found)
 
 
-def _is_physical(name: str, value: float, found: Identification) -> bool:
+def can_be(name: str, found: Identification) -> bool:
     """Return whether friction resists the motion, and a weight pulls without a negative spring beside it."""
     term = BUILT_IN.get(name)
     if term is None:
         return True
+    value, *_ = found.value(name)
     if term.spring == "instead":
         return value > 0 and found.value("stiffness").value >= -_AGAINST * value
     return value > 0 or not term.dissipates

@@ -16,6 +16,7 @@ from tvident._identify.left_over import AS_GOOD, Left, Unexplained, unexplained
 from tvident._identify.offered import (
     BEYOND_CHANCE,
     are_distinguished,
+    can_be,
     feeds_energy,
     holds,
     is_there,
@@ -252,9 +253,28 @@ class Trial:
                 there = [one for one, result in self._beside.get(0, {}).items() if is_there(one, result)]
                 worth = {"lag", *self.beyond_chance, *there}
                 suspects = [one for one in self.suspects if place == 0 or one in worth]
-                tried = {one: self._tried(kinds, self._with(call, one)) for one in suspects}
-                self._beside[place] = {one: found for one, found in tried.items() if found is not None}
+                self._beside[place] = self._tried_until_settled(kinds, call, suspects)
             yield self._beside[place]
+
+    def _tried_until_settled(
+        self, kinds: Mapping[str, Any], call: Call, suspects: Sequence[str]
+    ) -> dict[str, Identification]:
+        """Return what is found with one suspect after the other, up to the first that leaves nothing to explain."""
+        tried = {}
+        for one in suspects:
+            found = self._tried(kinds, self._with(call, one))
+            if found is not None:
+                tried[one] = found
+                if self._leaves_nothing(found) and self._may_be(one, found):
+                    break
+        return tried
+
+    def _leaves_nothing(self, found: Identification) -> bool:
+        """Return whether nothing contradicts a result, its suspects included, and it explains nearly all that was left.
+
+        Whatever else is tried can explain hardly more.
+        """
+        return not found.record_status & _CONTRADICTED and self._left_of(found).ratio <= _NEARLY_ALL
 
     def _tried(self, kinds: Mapping[str, Any], call: Call) -> Identification | None:
         """Return what is found with other terms or another lag; None where that cannot be asked of the record."""
@@ -344,7 +364,7 @@ class Trial:
         is_none = call["stiffness"] != before["stiffness"]
         kept = {name: call[name] if name == "stiffness" and is_none else kind for name, kind in self.given.items()}
         is_at_hand = self.is_as_asked and not (chosen or is_none)
-        free = self.result if is_at_hand else self.identify(**kept, terms=call["terms"], lag=call["lag"])
+        free = self.result if is_at_hand else self.identify(**kept, terms=call["terms"], lag=call["lag"], diagnose=True)
         left, left_free = self._left_of(found), self._left_of(free)
         changing = [name for name in COEFFICIENTS if free.settings["kinds"][name] in {"windowed", "varying"}]
         is_as_good = bool(changing) and left.ratio <= AS_GOOD * left_free.ratio
@@ -352,7 +372,8 @@ class Trial:
         best, of_best = (left, found) if is_simple else (left_free, free)
         if not (is_simple or chosen or is_none):
             return None
-        if not best.ratio <= (_BETTER if is_simple else self._worth) or self._feeds_energy(of_best):
+        is_worth_it = best.least.share < 1 and best.ratio <= (_BETTER if is_simple else self._worth)
+        if not is_worth_it or self._feeds_energy(of_best) or not all(can_be(one, of_best) for one in chosen):
             return None
         flags = self._identified(call, diagnose=True).record_status
         if not holds(best.least.share, flags):
@@ -373,7 +394,7 @@ class Trial:
             changes.append(f"lag={call['lag']:.4g}")
         changes += [f"{name}='constant'" for name in changing if is_simple and call[name] == "constant"]
         said = f"{', '.join(words)}: try {', '.join(changes)}; {best}{self._moved(of_best, is_more=bool(chosen))}"
-        is_settled = is_simple and not flags & DOUBTFUL_RECORD
+        is_settled = not flags & DOUBTFUL_RECORD if is_simple else self._leaves_nothing(free)
         # With an unknown less the others are told apart whatever the truth is.
         is_more = bool(chosen) and not is_none
         distinguishes = is_more and are_distinguished(flags if is_simple else free.record_status)
