@@ -158,6 +158,7 @@ def test_a_gain_that_drifts_is_no_change_of_the_machine(damping: float, seed: in
     assert said.startswith("inertia, damping and stiffness" if named else "inertia and stiffness")
 
 
+@pytest.mark.long
 def test_a_heavier_machine_is_no_gain_that_drifts() -> None:
     heavier = tvident.simulate_torsional_rig(
         20.0, seed=1, damping=0.041, angle_noise=1e-3, inertia=lambda t: 0.0123 * (1 + 0.2 * t / 20.0)

@@ -15,7 +15,7 @@ def test_cycles_that_are_alike_are_known_better_than_published() -> None:
         assert max(errors.values()) < most, errors
 
 
-@pytest.mark.parametrize("seed", [0, *long(*range(1, 10))])
+@pytest.mark.parametrize("seed", long(*range(10)))
 def test_cycles_that_vary_are_known_better_than_published(seed: int) -> None:
     record = gait.simulated(seed, variation=0.025)
     errors = record.error(gait.broad_harmonics(record))

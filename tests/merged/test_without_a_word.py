@@ -170,7 +170,7 @@ def test_clean_chains_hear_nothing(seeds: range) -> None:
             assert not found.advice
 
 
-@pytest.mark.parametrize("changes", [0, 1])
+@pytest.mark.parametrize("changes", [0, *long(1)])
 def test_a_spring_that_no_equation_tells_has_no_number(changes: int) -> None:
     # The angle of a mass is missing for a second: the spring that no other equation holds was zero there, without an error, and trusted.
     springs = [constant(12.0), constant(18.0), constant(16.0), constant(14.0)]
@@ -196,7 +196,7 @@ def test_a_spring_is_known_beside_one_sample_that_was_lost() -> None:
 
 
 @pytest.mark.first(2)
-@pytest.mark.parametrize("angle_noise", [1e-4, 1e-5, *long(1e-3)])
+@pytest.mark.parametrize("angle_noise", [1e-4, *long(1e-5, 1e-3)])
 @pytest.mark.parametrize("seed", [0, *long(1, 2)])
 def test_nothing_is_drawn_to_zero_where_a_force_acts_on_one_mass(seed: int, angle_noise: float) -> None:
     # Equations without a force hold for any multiple of their parameters. As long as the spring was taken as constant they drew
@@ -212,7 +212,7 @@ def test_nothing_is_drawn_to_zero_where_a_force_acts_on_one_mass(seed: int, angl
     assert np.sqrt(np.nanmean(error**2)) < 0.02 * 20
 
 
-@pytest.mark.parametrize(("masses", "driven", "changes"), [(2, 1, 0), (2, 1, 1), *long((3, 2, 0))])
+@pytest.mark.parametrize(("masses", "driven", "changes"), [(2, 1, 0), *long((2, 1, 1), (3, 2, 0))])
 def test_a_chain_on_a_moving_base_holds_its_scale(masses: int, driven: int, changes: int) -> None:
     # Of 30 such records three were 72 to 100 % off, two of them trusted in a part.
     values = [12.0, 18.0, 16.0][:masses]
