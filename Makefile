@@ -29,15 +29,21 @@ demo: $(DEMO_BUILT)  ## identify a simulated recording, print what was found aga
 
 .PHONY: test
 test:  ## every test but the longest; the last line says which tests had no recordings
-	# Packages are fetched while Rust compiles.
-	$(MAKE) --no-print-directory --jobs=2 test-rust $(READY)
+	# Packages are fetched while Rust compiles, and tests inside the core run while it is compiled as it is shipped.
+	$(MAKE) --no-print-directory --jobs=3 test-units test-crate $(READY)
 	$(MAKE) --no-print-directory test-python
 
 .PHONY: test-rust
-test-rust:  ## tests of the core
-	# Cargo has a job server of its own. Tests inside the core have it compiled for themselves: not optimised, that takes a fifth of the
-	# time, and they are short. All other tests share one core, as optimised as what is shipped.
+test-rust: test-units test-crate  ## tests of the core
+
+.PHONY: test-units
+test-units:
+	# Tests inside the core have it compiled for themselves: not optimised, that takes a fifth of the time, and they are short. All other
+	# tests share one core, as optimised as what is shipped. Cargo has a job server of its own.
 	MAKEFLAGS= cargo test --package tvident --lib --profile checked --quiet --config profile.checked.package.tvident.opt-level=0
+
+.PHONY: test-crate
+test-crate:
 	MAKEFLAGS= cargo test --workspace --test '*' --profile checked --quiet
 	MAKEFLAGS= cargo test --workspace --doc --profile checked --quiet
 
