@@ -270,11 +270,12 @@ class Trial:
         return tried
 
     def _leaves_nothing(self, found: Identification) -> bool:
-        """Return whether nothing contradicts a result, its suspects included, and it explains nearly all that was left.
+        """Return whether nothing contradicts the equation of a result, suspects included, and it explains nearly all that was left.
 
-        Whatever else is tried can explain hardly more.
+        Whatever else is tried can explain hardly more, and what a channel is suspected of no equation mends.
         """
-        return not found.record_status & _CONTRADICTED and self._left_of(found).ratio <= _NEARLY_ALL
+        contradicted = found.record_status & _CONTRADICTED & ~Status.CHANNEL_SUSPECTED
+        return not contradicted and self._left_of(found).ratio <= _NEARLY_ALL
 
     def _tried(self, kinds: Mapping[str, Any], call: Call) -> Identification | None:
         """Return what is found with other terms or another lag; None where that cannot be asked of the record."""
