@@ -11,14 +11,29 @@ _IN_BRACKETS = re.compile(
 )
 _WITHIN = re.compile(r"(.*?)[\s_]*(?:\[([^\[\]]*)\]|(?<=[\s_])\(([^()]*)\)|\(([^()]{2,})\))[\s_]*(.*)", re.DOTALL)
 """A unit before or amid words. Without a blank before it, what stands in parentheses may be the argument of a function."""
+_WIDE = str.maketrans("（）［］【】｛｝", "()[][]{}")  # noqa: RUF001 - as Japanese and Chinese programs write them
 _BEHIND_A_SIGN = re.compile(r"(.+?)\s*(?:(?<![/\s])\s*/\s*|,\s*|\s+in\s+)([^,]+)", re.DOTALL)
+_PATHS = ("s", "h")
+"""Symbols of a path and of a height, which would be units elsewhere."""
 _LONG = (
     "deg|degrees?|rad|radians?|mrad|urad|Nm|Nmm|Ncm|mNm|cNm|kNm|N[ _·*.-]mm?|kN|mN|lbf|(?:in|ft)[ _-]?lbf?|lbf?[ _-]?(?:in|ft)"
     "|ms|msecs?|milliseconds?|us|usecs?|microseconds?|ns|nsecs?|nanoseconds?|secs?|seconds?|mm|um|µm|rpm|°"
+    "|Deg|Degrees?|DEG|DEGREES?|RAD|RADIANS?|MRAD|NMM|KN|LBF|MM|RPM|MSECS?|MILLISECONDS?|SECS?|SECONDS?"
 )
-_BEHIND_A_LINE = re.compile(rf"(.+?)(?:_|\s+-\s+|\s+)({_LONG})", re.DOTALL)
-"""Units that are no name of anything else, behind a line or a blank."""
-_AMID_LINES = re.compile(r"(.+?)_(deg|degrees|rad|mrad|Nm|Nmm|mNm|kNm|kN)_(.+)", re.DOTALL)
+_BEHIND_A_LINE = re.compile(rf"(.+?)(?:_|\.\.+|\s+-\s+|\s+)({_LONG}|(?<=[_.])N(?=[_.]))[_.]?", re.DOTALL)
+"""Units that are no name of anything else, behind a line or a blank; MATLAB and R write a line or a point for every bracket."""
+_AMID_LINES = re.compile(r"(.+?)([_ ])(deg|degrees|DEG|rad|mrad|Nmm?|mNm|kNm|kN)[_ ](.+)", re.DOTALL)
+_ALONE = re.compile(
+    "deg|degrees?|Nmm?|mNm|kNm|kN|mm|rpm|m(?:illi)?secs?|u(?:sec)s?|micro(?:secs?|seconds?)|milliseconds?|secs?|seconds?|ms|millis|micros",
+    re.IGNORECASE,
+)
+"""What is a channel's whole name where a program writes units for names."""
+_OF_TIMES = re.compile(
+    r"(.*(?:time|zeit|stamp|elapsed).*?)(?:(?:[_\s]+|\.\.+)(s|[mun]s|[mun]?secs?|millis|micros|nanos)|(?<=[a-z])([MUN][sS]|Millis|Micros|Nanos))[_.]*",
+    re.IGNORECASE | re.DOTALL,
+)
+_TIMES = {"millis": "ms", "micros": "us", "nanos": "ns"}
+"""What Arduino calls its times."""
 _BEHIND_A_WORD = re.compile(r"(.*[a-z])(Deg|Degrees|Rad|Radians|MRad|Nm|Nmm|Ms|Msec|Sec)")
 """The same at the end of a name that capitals divide into words."""
 _OF_TORQUES = re.compile(r"(.*(?:torque|moment|effort|tau).*?)[_\s]+(nmm?|mnm|knm)", re.IGNORECASE | re.DOTALL)
@@ -32,6 +47,8 @@ def named_unit(name: str) -> tuple[str, str]:
     What stands in brackets at the end is the unit, whatever it is, unless it is a number, which tells channels apart (``Y[0]``; a ratio is
     `` [1]``); elsewhere only what is known as one.
     """
+    if not name.isascii():
+        name = name.translate(_WIDE)
     found = _IN_BRACKETS.fullmatch(name)
     if found and found[1]:
         unit = next(one for one in found.groups()[1:] if one is not None).strip()
@@ -48,19 +65,35 @@ def named_unit(name: str) -> tuple[str, str]:
 
 
 def _without_brackets(name: str) -> tuple[str, str]:
+    if _ALONE.fullmatch(name):
+        return name, _TIMES.get(name.lower(), name)
     found = _BEHIND_A_SIGN.fullmatch(name)
-    if found and unit_of(found[2]) is not None and unit_of(name) is None:
+    if found and _is_unit_of(found[2], found[1]):
         return found[1], found[2].strip()
     found = _OF_TORQUES.fullmatch(name)
     if found:
         return found[1], _TORQUES[found[2].lower()]
+    found = _OF_TIMES.fullmatch(name)
+    if found:
+        unit = (found[2] or found[3]).lower()
+        return found[1], _TIMES.get(unit, unit)
     for pattern in (_BEHIND_A_LINE, _BEHIND_A_WORD):
         found = pattern.fullmatch(name)
         unit = found[2].replace("_", "-") if found else ""
         if found and unit_of(unit) is not None and unit_of(name) is None:
             return found[1], unit
     found = _AMID_LINES.fullmatch(name)
-    return (f"{found[1]}_{found[3]}", found[2]) if found else (name, "")
+    return (f"{found[1]}{found[2]}{found[4]}", found[3]) if found else (name, "")
+
+
+def _is_unit_of(text: str, symbol: str) -> bool:
+    """Return whether what stands behind a slash is the unit of the symbol before it: ``M/Nm``, ``s/mm``, but not ``m/s``."""
+    unit = unit_of(text)
+    if unit is None:
+        return text.strip().lower() in {"grad", "altgrad"}  # refused, since it may mean degrees or gon
+    length = unit_of("m")
+    is_length = length is not None and unit.dimension == length.dimension
+    return unit_of(symbol) is None or unit_of(f"{symbol}/{text}") is None or (symbol in _PATHS and is_length)
 
 
 def derivative_units(unit: str, count: int) -> list[str]:
