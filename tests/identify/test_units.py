@@ -116,6 +116,34 @@ def test_numbers_that_are_not_plausible_are_asked_about() -> None:
     assert "stiffness" in reversed_sign
 
 
+@pytest.mark.parametrize(
+    ("factor", "first", "word", "unit"),
+    [
+        (1e6, 0.0, "microseconds", "us"),
+        (1e5, 0.0, "microseconds", "us"),  # 10 kHz
+        (1e9, 1.7e18, "nanoseconds", "ns"),
+        (1 / 86_400, 45_296.5, "days", "days"),
+        (1 / 86_400, 739_200.5, "days", "days"),
+    ],
+)
+def test_stamps_and_days_are_asked_about_with_the_unit_that_cures(
+    factor: float, first: float, word: str, unit: str
+) -> None:
+    """Nanoseconds heard "milliseconds?", which left an inertia of 1e4 kg m², and days nothing."""
+    times = first + factor * RIG.time
+    if factor > 1:
+        times = np.round(times).astype(np.int64)
+    call = {"sample_rate": 1000, "stiffness": "constant"}
+    result = tvident.identify(RIG.angle, RIG.torque, **{**call, "sample_rate": None, "t": times})
+    assert f"is the time in {word}? Then give time_unit='{unit}' with t=" in "; ".join(result.advice)
+    assert "all in other units if a channel is" in result.summary().splitlines()[0]
+    cured = tvident.identify(RIG.angle, RIG.torque, **{**call, "sample_rate": None, "t": times}, time_unit=unit)
+    assert "is the time in" not in "; ".join(cured.advice)
+    if factor in {1e6, 1e9}:
+        expected = tvident.identify(RIG.angle, RIG.torque, **call).constants["inertia"][0]
+        assert cured.constants["inertia"][0] == pytest.approx(expected, rel=1e-6)
+
+
 def test_a_damping_that_feeds_energy_and_a_spring_that_pushes_are_asked_about() -> None:
     generator = np.random.default_rng(0)
     t = np.arange(8000) / 1000

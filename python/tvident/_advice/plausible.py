@@ -20,6 +20,12 @@ _SLOW = 0.09
 """A sample period in seconds from which on it may be in milliseconds: a step of 0.1 ms, at 10 kHz, looks like 0.1 s, and hardly a vibration
 is sampled so slowly."""
 
+_LONGEST_STEP = 50.0
+"""Of times in milliseconds, 20 Hz; a longer step is in microseconds, up to a thousand times as long, or in nanoseconds."""
+
+_DAYS = 2e-7
+"""A sample period in seconds, 5 MHz, up to which it may be in days, as spreadsheets and datenum count: 60 Hz or more."""
+
 _CERTAIN = 4.0
 """Standard errors by which a number differs from zero: one of 16 000 does so by chance."""
 
@@ -74,13 +80,24 @@ class Plausible:
         ]
 
     def _slow(self) -> list[str]:
-        if self.period < _SLOW or "time" not in self.axis.assumed:
+        if "time" not in self.axis.assumed:
+            return []
+        if self.period <= _DAYS:
+            word, unit = "days", "days"
+        elif self.period >= _SLOW:
+            word, unit = next(
+                (word, unit)
+                for most, word, unit in (
+                    (_LONGEST_STEP, "milliseconds", "ms"),
+                    (1000 * _LONGEST_STEP, "microseconds", "us"),
+                    (math.inf, "nanoseconds", "ns"),
+                )
+                if self.period <= most
+            )
+        else:
             return []
         return [
-            (
-                f"there is one sample in {self.period:.4g} s: is the time in milliseconds? Then give time_unit='ms' with t= "
-                "or delta="
-            )
+            f"there is one sample in {self.period:.4g} s: is the time in {word}? Then give time_unit='{unit}' with t= or delta="
         ]
 
     def _signs(self, found: Estimates, record: int) -> list[str]:

@@ -11,7 +11,7 @@ TRIED = "of what is held back are predicted"
 BECOMES = " becomes "
 """Between a parameter and the value that a better equation gives it, in advice."""
 
-OTHER_UNIT = ("degrees?", "milliseconds?")
+OTHER_UNIT = ("degrees?", "is the time in ")
 """How advice asks about units, of which all numbers depend."""
 
 FED_BACK = "the torque holds the angle's noise"

@@ -77,6 +77,7 @@ _ALONE: dict[tuple[str, ...], tuple[float, Dimension]] = {
     ("nanosecond", "nanoseconds"): (1e-9, _TIME),
     ("min", "minute", "minutes"): (60.0, _TIME),
     ("h", "hr", "hrs", "hour", "hours"): (3600.0, _TIME),
+    ("day", "days"): (86_400.0, _TIME),
     ("lb", "lbs", "lbm"): (_POUND, _MASS),
     ("oz",): (_POUND / 16, _MASS),
     ("newton", "newtons", "Newton", "Newtons"): (1.0, _FORCE),
