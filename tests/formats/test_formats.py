@@ -7,10 +7,13 @@ import sys
 import warnings
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 import pytest
+from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 
 import recorded_files as examples
@@ -143,6 +146,74 @@ def test_matlab_structures_are_channels_with_units(tmp_path: Path) -> None:
     found = tvident.FileRecording({name: value for name, value in numbers if not isinstance(value, str)})
     assert found.units == {"angle": "deg", "rig.torque": "N m", "fs": ""}
     assert found["torque"] is found["rig.torque"]
+
+
+def test_a_matlab_file_that_was_cut_says_that_more_may_be_lost(tmp_path: Path) -> None:
+    names = ("time", "angle", "torque")
+    savemat(tmp_path / "whole.mat", dict(zip(names, (examples.T, examples.ANGLE, examples.TORQUE), strict=True)))
+    content = (tmp_path / "whole.mat").read_bytes()
+    (tmp_path / "x.mat").write_bytes(content[: len(content) // 2])
+    with pytest.warns(
+        recordings.FileWarning,
+        match=r"not read: angle .*what may follow it, where the file was cut",
+    ):
+        found = tvident.read_recording(tmp_path / "x.mat")
+    assert set(found.units) == {"time"}
+
+
+def _structures(fields: tuple[str, ...], rows: list[tuple[Any, ...]]) -> npt.NDArray[Any]:
+    made = np.zeros((1, len(rows)), dtype=[(name, "O") for name in fields])
+    for place, row in enumerate(rows):
+        made[0, place] = row
+    return made
+
+
+def test_arrays_of_matlab_structures_are_channels_by_name(tmp_path: Path) -> None:
+    """Names and units of `channels(i)` and of a scope of Simulink were lost, and with them degrees."""
+    columns = examples.ANGLE[:, None], examples.TORQUE[:, None]
+    channels = _structures(("name", "data", "unit"), [("angle", columns[0], "deg"), ("torque", columns[1], "Nmm")])
+    signals = _structures(
+        ("values", "dimensions", "label", "blockName"),
+        [(columns[0], 1, "angle", "rig/Out1"), (columns[1], 1, "", "rig/Torque"), (columns[1], 1, "", "rig/Torque")],
+    )
+    one = {"value": examples.ANGLE, "Unit": "deg", "fs": 250.0, "name": "encoder"}
+    content = {"channels": channels, "scope": {"time": examples.T[:, None], "signals": signals}, "encoder": one}
+    savemat(tmp_path / "x.mat", content)
+    found = tvident.read_recording(tmp_path / "x.mat")
+    scope = {f"scope.signals.{name}": "" for name in ("angle", "rig/Torque", "rig/Torque_2")}
+    assert found.units == {
+        "channels.angle": "deg",
+        "channels.torque": "Nmm",
+        "scope.time": "",
+        **scope,
+        "encoder": "deg",
+        "encoder.fs": "",
+    }
+    np.testing.assert_array_equal(found["channels.torque"], examples.TORQUE)
+    np.testing.assert_array_equal(found["scope.signals.rig/Torque"], examples.TORQUE)
+
+
+def test_channels_of_tdms_that_began_later_have_times_of_their_own(tmp_path: Path) -> None:
+    """Two devices that started 5 samples apart were read as if sampled together: a lag that nobody heard of."""
+    start = np.datetime64("2024-01-01T10:00:00.5")
+    for later, names in (
+        (20_000, {"rig.time", "rig.angle", "rig.time_2", "rig.torque"}),
+        (3, {"time", "angle", "torque"}),
+    ):
+        common = {"wf_increment": 1 / 250, "wf_start_offset": 0.0}
+        begun = start + np.timedelta64(later, "us")
+        with TdmsWriter(tmp_path / "x.tdms") as writer:
+            writer.write_segment(
+                [
+                    ChannelObject("rig", "angle", examples.ANGLE, {**common, "wf_start_time": start, "Unit": "deg"}),
+                    ChannelObject("rig", "torque", examples.TORQUE, {**common, "wf_start_time": begun, "units": "N m"}),
+                ]
+            )
+        found = tvident.read_recording(tmp_path / "x.tdms")
+        assert set(found.units) == names
+        assert set(found.units.values()) == {"s", "deg", "N m"}
+        if later == 20_000:
+            np.testing.assert_allclose(found["rig.time_2"] - found["rig.time"], 0.02, atol=1e-12)
 
 
 def test_results_go_to_files_of_every_kind(tmp_path: Path) -> None:

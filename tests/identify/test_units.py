@@ -133,7 +133,7 @@ def test_stamps_and_days_are_asked_about_with_the_unit_that_cures(
     times = first + factor * RIG.time
     if factor > 1:
         times = np.round(times).astype(np.int64)
-    call = {"sample_rate": 1000, "stiffness": "constant"}
+    call: dict[str, Any] = {"sample_rate": 1000, "stiffness": "constant"}
     result = tvident.identify(RIG.angle, RIG.torque, **{**call, "sample_rate": None, "t": times})
     assert f"is the time in {word}? Then give time_unit='{unit}' with t=" in "; ".join(result.advice)
     assert "all in other units if a channel is" in result.summary().splitlines()[0]

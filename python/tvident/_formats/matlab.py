@@ -25,6 +25,10 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
 _VALUES = ("data", "values", "value", "signal", "y")
 _UNITS = ("unit", "units")
 """Fields of a structure that is one channel."""
+_NAMES = ("name", "names", "label", "channel", "channelname", "signalname", "title", "blockname")
+"""Fields of an array of structures that call its channels; a scope of Simulink has a label, which may be empty, and a name of a block."""
+_SHAPES = ("dimensions",)
+"""What Simulink says beside the samples."""
 
 
 def _read(path: str, skipped: list[str]) -> Mapping[str, Any]:
@@ -35,11 +39,14 @@ def _read(path: str, skipped: list[str]) -> Mapping[str, Any]:
         variables = read_mat(path)
     except Exception as error:
         variables = {}
-        for name in _names(path, error):
+        names = _names(path, error)
+        for name in names:
             try:
                 variables |= read_mat(path, variable_names=[name])
             except Exception as reason:  # noqa: BLE001 - likewise
                 skipped.append(f"{cut(name)} ({in_words(reason)})")
+                if name == names[-1]:
+                    skipped.append("what may follow it, where the file was cut")
         if not variables:
             raise
     return variables
@@ -70,21 +77,60 @@ def _flat(prefix: str, variables: Mapping[str, Any]) -> Iterator[tuple[str, Any]
     for name, value in fields.items():
         if value is units and units:
             continue
-        channel = _one_channel(value) if isinstance(value, Mapping) else (value, units.get(name, ""))
+        if not isinstance(value, Mapping):
+            yield _with_unit(f"{prefix}{name}", units.get(name, "")), value
+            continue
+        several = _several_channels(value)
+        if several:
+            yield from ((f"{prefix}{name}.{one}", samples) for one, samples in several)
+            continue
+        channel = _one_channel(value)
         if channel is None:
             yield from _flat(f"{prefix}{name}.", value)
             continue
-        samples, unit = channel
-        yield (f"{prefix}{name} [{unit}]" if isinstance(unit, str) and unit else f"{prefix}{name}"), samples
+        samples, unit, rest = channel
+        yield _with_unit(f"{prefix}{name}", unit), samples
+        yield from _flat(f"{prefix}{name}.", rest)
 
 
-def _one_channel(fields: Mapping[str, Any]) -> tuple[Any, str] | None:
-    """Return the samples and the unit of a structure that holds these and words about them."""
+def _with_unit(name: str, unit: Any) -> str:
+    return f"{name} [{unit}]" if isinstance(unit, str) and unit else name
+
+
+def _one_channel(fields: Mapping[str, Any]) -> tuple[Any, str, Mapping[str, Any]] | None:
+    """Return the samples and the unit of a structure that holds these, and the numbers beside them."""
     lower = {str(name).lower(): value for name, value in fields.items()}
     values = [name for name in _VALUES if name in lower and not isinstance(lower[name], str | Mapping)]
     unit = next((lower[name] for name in _UNITS if isinstance(lower.get(name), str)), None)
-    rest = [value for name, value in lower.items() if name not in values and not isinstance(value, str)]
-    return (lower[values[0]], unit) if len(values) == 1 and unit is not None and not rest else None
+    if len(values) != 1 or unit is None:
+        return None
+    rest = {name: one for name, one in fields.items() if str(name).lower() != values[0] and not isinstance(one, str)}
+    return lower[values[0]], unit, rest
+
+
+def _several_channels(fields: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Return the channels of an array of structures, each with a name, samples and maybe a unit; none where it is something else."""
+    lower = {str(name).lower(): value for name, value in fields.items() if str(name).lower() not in _SHAPES}
+    values = [name for name in _VALUES if isinstance(lower.get(name), list)]
+    if len(values) != 1:
+        return []
+    samples = lower[values[0]]
+    called = [lower[name] for name in _NAMES if isinstance(lower.get(name), list) and len(lower[name]) == len(samples)]
+    names = [next((str(one[place]) for one in called if _is_word(one[place])), "") for place in range(len(samples))]
+    units = next((lower[name] for name in _UNITS if isinstance(lower.get(name), list)), [""] * len(samples))
+    if not all(names) or len(units) != len(samples):
+        return []
+    used: dict[str, int] = {}
+    found = []
+    for name, unit, one in zip(names, units, samples, strict=True):
+        used[name] = used.get(name, 0) + 1
+        found.append((_with_unit(name if used[name] == 1 else f"{name}_{used[name]}", unit), one))
+    others = {name: one for name, one in lower.items() if name not in {*values, *_NAMES, *_UNITS}}
+    return [*found, *_flat("", others)]
+
+
+def _is_word(value: Any) -> bool:
+    return isinstance(value, str) and bool(value.strip())
 
 
 def _of_dspace(fields: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:

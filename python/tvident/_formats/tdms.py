@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from tvident._formats.groups import Group, named
 from tvident._formats.told import cut
+
+_UNITS = ("unit_string", "ni_unitdescription", "unit", "units", "y_unit_label", "unit_description")
+"""Properties that hold a unit, in small letters."""
+
+_SAME_START = 1e-3
+"""Parts of a sample period that two starts may differ by and still be one."""
 
 
 def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
@@ -17,6 +23,7 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     file = TdmsFile.read(path)
     if file.file_status.incomplete_final_segment:
         skipped.append("what was cut off at the end of the file (channels may have different lengths)")
+    starts = [one.properties["wf_start_time"] for group in file.groups() for one in group.channels() if _has_start(one)]
     groups: list[Group] = []
     for group in file.groups():
         for channel in group.channels():
@@ -30,9 +37,15 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
                 skipped.append(f"{cut(channel.name)} (no numbers)")
                 continue
             else:
-                unit = str(properties.get("unit_string") or properties.get("NI_UnitDescription") or "")
+                unit = _unit(properties)
             period, first = properties.get("wf_increment"), properties.get("wf_start_offset", 0.0)
-            time = None if not period or not samples.size else float(first) + float(period) * np.arange(samples.size)
+            time = None
+            if period and samples.size:
+                later = (
+                    (properties["wf_start_time"] - min(starts)) / np.timedelta64(1, "s") if _has_start(channel) else 0.0
+                )
+                later = later if later > _SAME_START * period else 0.0
+                time = float(first) + later + float(period) * np.arange(samples.size)
             part = Group(group.name, time, [(channel.name, unit, samples)])
             before = next((one for one in groups if one.name == group.name and _same(one.time, time)), None)
             if before is None:
@@ -40,6 +53,15 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
             else:
                 before.channels += part.channels
     yield from named(groups)
+
+
+def _has_start(channel: Any) -> bool:
+    return bool(channel.properties.get("wf_increment")) and "wf_start_time" in channel.properties
+
+
+def _unit(properties: Mapping[str, Any]) -> str:
+    lower = {str(name).lower(): value for name, value in properties.items()}
+    return next((str(lower[name]) for name in _UNITS if lower.get(name)), "")
 
 
 def _same(time: Any, other: Any) -> bool:
