@@ -157,6 +157,45 @@ def test_a_run_is_repeated_from_its_result_and_from_toml(folder: Path) -> None:
     assert "must hold options of tvident identify, without dashes before them; got 'stifness'; use" in wrong.stderr
 
 
+def test_settings_are_read_from_a_file_of_any_name(folder: Path) -> None:
+    """What --settings-output wrote to chosen.toml could not be read back."""
+    assert run(*IDENTIFY, "--settings-output", "chosen.toml", "-o", "chosen.npz").returncode == 0
+    assert run(*IDENTIFY, "--settings", "chosen.toml", "-o", "repeated.npz").returncode == 0
+    first, second = (tvident.load(folder / f"{name}.npz") for name in ("chosen", "repeated"))
+    np.testing.assert_array_equal(first.stiffness, second.stiffness)
+
+
+def test_derivatives_take_options_from_toml(folder: Path) -> None:
+    (folder / "slopes.toml").write_text('channel = "angle"\nsample-rate = 1000\norder = 7\nwindow-length = 41\n')
+    typed = ("--channel", "angle", "--sample-rate", "1000", "--order", "7", "--window-length", "41")
+    written = run("derivatives", "rig.npz", "--settings", "slopes.toml", "-o", "-")
+    assert written.returncode == 0, written.stderr
+    assert written.stdout == run("derivatives", "rig.npz", *typed, "-o", "-").stdout
+    wrong = run("derivatives", "rig.npz", "--settings", "rig.npz")
+    assert wrong.returncode == 2
+    assert "must be a file that ends in .toml and holds options" in " ".join(wrong.stderr.split())
+
+
+def test_a_command_that_is_none_hears_which_was_meant() -> None:
+    for typed, said in (
+        ("identfy", "did you mean identify?"),
+        ("raport", "did you mean report?"),
+        ("xyz", "there are"),
+    ):
+        done = run(typed)
+        assert done.returncode == 2
+        assert f"No such command '{typed}'; {said}" in done.stderr
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_report_goes_to_standard_output() -> None:
+    done = run("report", *IDENTIFY[1:], "-o", "-")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("<!doctype html>")
+    assert done.stdout.rstrip().endswith("</html>")
+    assert "K(t) known to" in done.stderr
+
+
 @pytest.mark.first(1)
 @pytest.mark.parametrize("ending", [".csv", ".xlsx"])
 def test_a_table_is_repeated_from_the_settings_beside_it(folder: Path, ending: str) -> None:

@@ -296,7 +296,7 @@ def test_the_command_shows_every_channel_of_the_file(tmp_path: Path, monkeypatch
     ):
         assert text.count(f'"title": "{name}"') == 1
     assert '"title": "angle"' not in text
-    for output, message in (("page.pdf", "-o must end in .html"), ("no/page.html", "there is no such folder")):
+    for output, message in (("page.pdf", "-o must end in .html, or be -"), ("no/page.html", "there is no such folder")):
         refused = CliRunner().invoke(main, [*call, "-o", output])
         assert refused.exit_code in {1, 2}
         assert message in refused.output

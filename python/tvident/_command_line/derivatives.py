@@ -8,7 +8,7 @@ import click
 
 from tvident._choices import Loss, RowPolicy, Selection
 from tvident._command_line.group import commands, main
-from tvident._command_line.options import CRITERION, PERIOD, RUN, TIME
+from tvident._command_line.options import CRITERION, PERIOD, RUN, TIME, only_options_from_toml
 
 
 @main.command(epilog="Example: tvident derivatives rig.csv --channel angle --time time -o derivatives.csv")
@@ -48,6 +48,14 @@ from tvident._command_line.options import CRITERION, PERIOD, RUN, TIME
 @click.option("--max-gap", help="Longer gaps split the record: samples or a duration. Half a window if not given.")
 @click.option(
     "--min-observations", type=int, help="Samples that a window with a gap must hold. Half of them if not given."
+)
+@click.option(
+    "--settings",
+    type=click.Path(),
+    is_eager=True,
+    expose_value=False,
+    callback=only_options_from_toml,
+    help="TOML file of options, as order = 7.",
 )
 @RUN
 def derivatives(**options: Any) -> None:

@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import get_args
 
 import click
 
 from tvident._choices import TERM_NAMES, RowPolicy
-from tvident._command_line.group import commands
 from tvident._command_line.method import METHOD
-from tvident._command_line.options import BESIDE, CHANNELS, PERIOD, TIME, options_of
-
-
-def _options_from_toml(ctx: click.Context, _: click.Parameter, path: str | None) -> str | None:
-    """Take what a TOML file holds for the options that are not given; return the path of settings of an earlier result."""
-    if path is None or Path(path).suffix.lower() != ".toml":
-        return path
-    remaining: str | None = commands().options_from_toml(ctx, path)
-    return remaining
-
+from tvident._command_line.options import BESIDE, CHANNELS, PERIOD, TIME, options_from_toml, options_of
 
 IDENTIFICATION = options_of(
     CHANNELS,
@@ -67,7 +56,7 @@ IDENTIFICATION = options_of(
         "--settings",
         type=click.Path(),
         is_eager=True,
-        callback=_options_from_toml,
+        callback=options_from_toml,
         help="Settings of an earlier run: its result, or what --settings-output wrote; or a TOML file of options.",
     ),
     click.option(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 import click
 
 from tvident._choices import Criterion
+from tvident._command_line.group import commands
 
 Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 
@@ -19,6 +21,22 @@ def options_of(*options: Callable[[Decorated], Decorated]) -> Callable[[Decorate
         return function
 
     return decorate
+
+
+def options_from_toml(ctx: click.Context, _: click.Parameter, path: str | None) -> str | None:
+    """Take what a TOML file holds for the options that are not given; return the path of settings of an earlier result."""
+    if path is None or Path(path).suffix.lower() != ".toml":
+        return path
+    remaining: str | None = commands().options_from_toml(ctx, path)
+    return remaining
+
+
+def only_options_from_toml(ctx: click.Context, option: click.Parameter, path: str | None) -> None:
+    """Take what a TOML file holds for the options that are not given; refuse settings of an identification."""
+    if options_from_toml(ctx, option, path) is not None:
+        raise click.UsageError(
+            "--settings must be a file that ends in .toml and holds options, as order = 7; write one"
+        )
 
 
 CHANNELS = options_of(

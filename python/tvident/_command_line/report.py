@@ -21,7 +21,7 @@ from tvident._command_line.options import WORK
     type=click.Path(dir_okay=False),
     default="report.html",
     show_default=True,
-    help="The page: a name that ends in .html.",
+    help="The page: a name that ends in .html, or - for standard output.",
 )
 def report(**options: Any) -> None:
     """Identify as identify does, and write a page that shows the recording and the result.

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import click
@@ -11,7 +13,7 @@ from tvident import _report, recordings
 from tvident._commands.channels import channels_in, source_of
 from tvident._commands.identification import identified, inputs
 from tvident._commands.named import named, with_velocity
-from tvident._commands.output import REPORT, check_outputs, say
+from tvident._commands.output import REPORT, RESULTS, check_outputs, say
 from tvident._commands.words import in_options
 from tvident._files import full_name, printable
 
@@ -21,11 +23,11 @@ _MOST_CHANNELS = 40
 
 def report(file: str | None, output: str, **options: Any) -> None:
     """Identify as identify does, and write a page that shows the recording and the result."""
-    if Path(output).suffix.lower() not in {".html", ".htm"}:
-        raise click.UsageError(f"-o must end in .html; got '{printable(output)}'; rename it")
+    if output != "-" and Path(output).suffix.lower() not in {".html", ".htm"}:
+        raise click.UsageError(f"-o must end in .html, or be -; got '{printable(output)}'; rename it")
     _report.check_plotly()
     options = named(options, file)
-    check_outputs({REPORT: output}, inputs(file, options))
+    check_outputs({RESULTS if output == "-" else REPORT: output}, inputs(file, options))
     channels = channels_in(file)
     options = with_velocity(options, channels, file)
     result = identified(channels, file, **options)
@@ -38,10 +40,15 @@ def report(file: str | None, output: str, **options: Any) -> None:
     others = {name: values for name, values in channels.items() if values.shape == samples and name not in used}
     for name in list(others)[_MOST_CHANNELS:]:
         del others[name]
-    title = None if file is None else Path(file).name
-    result._report(output, others, title, said=in_options)  # noqa: SLF001 - as report does, in words of the command line
-    say(result.summary())
-    click.echo(f"\nWritten: {printable(output)}")
+    title = None if file in {None, "-"} else Path(file).name
+    with TemporaryDirectory() as folder:
+        page = Path(folder) / "report.html" if output == "-" else Path(output)
+        result._report(page, others, title, said=in_options)  # noqa: SLF001 - as report does, in words of the command line
+        if output == "-":
+            sys.stdout.buffer.write(page.read_bytes())
+    say(result.summary(), err=output == "-")
+    if output != "-":
+        click.echo(f"\nWritten: {printable(output)}")
 
 
 def _is_in(channels: recordings.Channels, name: str | None) -> bool:

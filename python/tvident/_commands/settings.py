@@ -35,7 +35,9 @@ def read_settings(path: str) -> dict[str, Any]:
         raise recordings.FileError(f"{place}: settings must be a file of at most {_MOST_BYTES} bytes; {cure}")
     try:
         text = Path(path).read_text(encoding="utf-8")
-        content = tomllib.loads(text) if ending == ".toml" else json.loads(text)
+        # Also what --settings-output wrote to a file of this name.
+        is_toml = ending == ".toml" and not text.lstrip().startswith("{")
+        content = tomllib.loads(text) if is_toml else json.loads(text)
     except (ValueError, RecursionError) as error:
         raise recordings.FileError(f"{place}: holds no settings ({error}); {cure}") from None
     if not isinstance(content, dict):
