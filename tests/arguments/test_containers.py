@@ -126,3 +126,20 @@ def test_dask_is_never_computed_silently(place: str) -> None:
 def test_what_is_no_channel_is_refused(values: Any, message: str) -> None:
     with pytest.raises(TypeError, match=message):
         identified(values, TORQUE)
+
+
+def test_records_below_each_other_are_no_record() -> None:
+    """Trials that an index of two levels tells apart were one record, with a jump from one to the next."""
+    rig = tvident.simulate_torsional_rig(duration=2.0)
+    levels = {"trial": range(2), "time": np.arange(1000) / 1000}
+    index = pd.MultiIndex.from_product(list(levels.values()), names=list(levels))
+    angle, torque = (pd.Series(one, index=index) for one in (rig.angle, rig.torque))
+    with pytest.raises(ValueError, match=r"begins again at sample 1000; pass angle.unstack\(0\), or one record"):
+        tvident.identify(angle, torque, sample_rate=1000)
+    swapped = angle.swaplevel().sort_index()
+    with pytest.raises(ValueError, match=r"pass y.unstack\(1\)"):
+        tvident.fit_local_polynomials(swapped, 101, sample_rate=1000)
+    result = tvident.identify(angle.unstack(0), torque.unstack(0), sample_rate=1000, stiffness="constant")
+    assert result.inertia.shape == (2, 1000)
+    one = tvident.identify(angle.loc[[0]], torque.loc[[0]], sample_rate=1000, stiffness="constant")
+    np.testing.assert_array_equal(one.inertia, result.inertia[0])

@@ -196,6 +196,7 @@ def test_a_value_whatever_the_kind() -> None:
     value, error, unit, kind, *_ = RESULT.value("inertia")
     assert (value, error) == RESULT.constants["inertia"]
     assert (unit, kind) == ("kg m^2", "constant")
+    assert str(RESULT.value("damping_ratio")).split()[-1] != "1"
     changing = RESULT.value("stiffness")
     assert changing.kind == "windowed"
     assert changing.least < changing.value < changing.greatest

@@ -42,6 +42,7 @@ def plain(name: str, values: Any) -> Any:
     if package == "dask":
         raise TypeError(_lazy(name, "a dask array" if hasattr(values, "chunks") else "a dask collection", ".compute()"))
     if package == "pandas" and (hasattr(values, "dtype") or hasattr(values, "dtypes")):
+        _check_one_record(name, values)
         return _of_pandas(values)
     if package == "polars" and not isinstance(values, type):
         if not hasattr(values, "to_numpy"):
@@ -86,6 +87,24 @@ def _lazy(name: str, what: str, call: str) -> str:
     return (
         f"{name} must be in memory; got {what}, which may be larger than memory and is never computed silently; "
         f"pass {name}{call}"
+    )
+
+
+def _check_one_record(name: str, values: Any) -> None:
+    """Refuse records that stand one below the other, as an index of several levels tells them apart."""
+    index: Any = getattr(values, "index", None)
+    if getattr(index, "nlevels", 1) == 1:
+        return
+    last = np.asarray(index.get_level_values(-1))
+    if last.dtype.kind not in "iufmM":
+        return
+    began = np.flatnonzero(last[1:] < last[:-1])
+    if not began.size:
+        return
+    level = min(range(index.nlevels), key=lambda one: index.get_level_values(one).nunique())
+    raise ValueError(
+        f"{name} must be one record, or a table with a column for each; the last level of its index begins again at sample "
+        f"{began[0] + 1}; pass {name}.unstack({level}), or one record of it: {name}.xs({index.get_level_values(level)[0]!r}, level={level})"
     )
 
 

@@ -47,7 +47,7 @@ class Measured(NamedTuple):
         if self.changes:
             ends = (to_digits_of(end, self.stderr) for end in (self.least, self.greatest))
             words = f"{' to '.join(ends)}, median {words}"
-        return f"{words} {self.unit}".rstrip()
+        return words if self.unit == "1" else f"{words} {self.unit}".rstrip()
 
 
 def number_of(values: Array, errors: Array, kind: str, unit: str, where: npt.NDArray[np.bool_]) -> Measured:
