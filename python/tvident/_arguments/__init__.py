@@ -5,6 +5,7 @@ from tvident._arguments.channels import as_record, channel, channels
 from tvident._arguments.containers import fields_of, is_table, package_of, plain, time_axis
 from tvident._arguments.digits import explained_in_words, ordinal, own_digits, percent, to_digits_of, with_error
 from tvident._arguments.labels import Labels, labels_in, labels_of, labels_out
+from tvident._arguments.lost import check_no_lost_samples
 from tvident._arguments.numbers import (
     LARGEST,
     finite_number,
@@ -48,6 +49,7 @@ __all__ = [
     "channels",
     "check_against_labels",
     "check_nan",
+    "check_no_lost_samples",
     "check_power",
     "check_window",
     "clock_changed",

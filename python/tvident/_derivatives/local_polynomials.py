@@ -213,7 +213,7 @@ def fit_local_polynomials(
     array, axis = given.array, given.axis
     samples = arguments.along_axis("y", array, axis)
     count = samples.shape[-1]
-    t, seconds, times = period_or_times(y, count, delta=delta, sample_rate=sample_rate, t=t)
+    t, seconds, times = period_or_times(y, samples, delta=delta, sample_rate=sample_rate, t=t)
     arguments.one_of("criterion", criterion, get_args(Criterion))
     arguments.one_of("selection", selection, get_args(Selection))
     arguments.check_nan("y", array, nan_policy, arguments.RowPolicy)

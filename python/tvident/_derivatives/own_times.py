@@ -22,7 +22,9 @@ _FEWEST = 64
 """Samples of a record whose windows are chosen, at least."""
 
 
-def period_or_times(values: Any, samples: int, **given: Any) -> tuple[Any, float, npt.NDArray[np.float64] | None]:
+def period_or_times(
+    values: Any, channel: npt.NDArray[np.number], **given: Any
+) -> tuple[Any, float, npt.NDArray[np.float64] | None]:
     """Return times in seconds where samples have any, the sample period, and the times again where they are not uniform.
 
     The period is then their mean step. Where nothing is given, times are those that the container says its samples have.
@@ -32,9 +34,10 @@ def period_or_times(values: Any, samples: int, **given: Any) -> tuple[Any, float
     if given["t"] is not None:
         given["t"] = times_in_seconds(given["t"])
     try:
-        period = arguments.sample_period(samples, **given)
+        period = arguments.sample_period(channel.shape[-1], **given)
+        arguments.check_no_lost_samples(given["t"], channel)
     except arguments.NotUniformError as error:
-        return given["t"], float(error.times[-1] - error.times[0]) / (samples - 1), error.times
+        return given["t"], float(error.times[-1] - error.times[0]) / (channel.shape[-1] - 1), error.times
     if given["t"] is None:
         arguments.check_against_labels(values, period)
     return given["t"], period, None

@@ -71,7 +71,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
     samples = torques.shape[-1]
     channels = {name: scaled(values, _factor_of(name, call[name], axis)) for name, values in channels.items()}
     torques = scaled(torques, axis.torque)
-    seconds, grid, begin = _sampling(sampling, samples, axis, call["time_unit"], first)
+    seconds, grid, begin = _sampling(sampling, axis, call["time_unit"], first, next(iter(channels.values())))
     if clocks is None:
         others = any(one is not None for one in (*beside_clocks.values(), call["weights"]))
         check_every_sample({**channels, "torque": torques}, seconds, others=others, in_parts="wanted" in call)
@@ -177,14 +177,20 @@ def _lag_left(request: Request, data: Data) -> tuple[float, float]:
 
 
 def _sampling(
-    given: Mapping[str, Any], samples: int, axis: Axis, time_unit: str | None, first: npt.ArrayLike
+    given: Mapping[str, Any],
+    axis: Axis,
+    time_unit: str | None,
+    first: npt.ArrayLike,
+    samples: npt.NDArray[np.number],
 ) -> tuple[float, Grid | None, float]:
     """Return the sample period, the grid that samples are to be brought onto where their times are not uniform, and the first time."""
+    count = samples.shape[-1]
     try:
-        seconds, times = sampled(given, samples, axis, time_unit, first)
+        seconds, times = sampled(given, count, axis, time_unit, first)
+        arguments.check_no_lost_samples(times, samples)
     except arguments.NotUniformError as error:
         grid = grid_of(error.times)
-        return arguments.sample_period(samples, delta=grid.period), grid, grid.start
+        return arguments.sample_period(count, delta=grid.period), grid, grid.start
     return seconds, None, arguments.begin_of(times)
 
 

@@ -236,6 +236,8 @@ def _sampling(options: Options, axis: Axis, angles: Sequence[Numbers], torques: 
     samples, workers = max(map(len, angles)), arguments.worker_count(options.workers)
     try:
         period, times = sampled(options.time, samples, axis, options.units["time_unit"])
+        longest = next(one for one in angles if len(one) == samples)
+        arguments.check_no_lost_samples(times, longest)
     except arguments.NotUniformError as error:
         lengths = {one.size for one in (*angles, *torques)}
         if len(lengths) > 1:
