@@ -17,7 +17,7 @@ from tvident._files.times import instant
 _COMPARED = 20
 """Rows that are looked at to tell one separator from another, and what columns hold."""
 
-_SEPARATORS: tuple[Separator, ...] = (",", ";", "\t", None)
+_SEPARATORS: tuple[Separator, ...] = (",", ";", "\t", "|", None)
 """The earlier one where numbers are the same for several."""
 
 _SEARCHED, _SEARCHED_FOR_WORDS = 100, 2000

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import chain
@@ -24,6 +25,12 @@ _HEAD, _PIECE = 1 << 20, 1 << 22
 
 _LONGEST_LINE = 1_000_000
 
+_MOST_ABOVE, _TALLEST = 100, 8
+"""Lines above the numbers that are looked at, and lines of one row of names."""
+
+_HOLDS_A_NUMBER = re.compile(r"(?:^|[,;\t|])\s*[+-]?[.,]?\d[\d.,]*\s*(?:[,;\t|]|$)", re.MULTILINE)
+"""A row that does is none of names."""
+
 _COMPRESSED = {
     b"\x1f\x8b": "gzip",
     b"PK\x03\x04": "zip",
@@ -35,7 +42,7 @@ _COMPRESSED = {
 
 
 def read_text(path: Path, say: Say) -> Channels:
-    """Read columns of numbers, with or without names, separated by commas, semicolons, tabs or blanks."""
+    """Read columns of numbers, with or without names, separated by commas, semicolons, tabs, bars or blanks."""
     return _decoded(path, lambda encoding: _with_decimal_sign(path, encoding, say))
 
 
@@ -144,7 +151,7 @@ def _begun(file: TextIO, decimal: str | None, say: Say) -> tuple[Dialect, Rows, 
         _refuse_long_line(head.count("\n") + 1)
     head += rest
     check_text(head, 0)
-    lines = head.split("\n")
+    lines = _with_whole_names(head.split("\n"))
     longest = max(range(len(lines)), key=lambda index: len(lines[index]))
     if len(lines[longest]) > _LONGEST_LINE:
         _refuse_long_line(longest + 1)
@@ -159,6 +166,22 @@ def _begun(file: TextIO, decimal: str | None, say: Say) -> tuple[Dialect, Rows, 
     first = "\n".join(lines[dialect.first :])
     pieces = chain([first], _pieces(file, head.count("\n")))
     return dialect, rows, map(rows.read, pieces)
+
+
+def _with_whole_names(lines: list[str]) -> list[str]:
+    """Return lines with names that a spreadsheet wrote over several, in quotes, in the last of these; numbers stay where they are."""
+    start = 0
+    while start < min(len(lines), _MOST_ABOVE):
+        end = start
+        while lines[start].count('"') % 2 and end < min(start + _TALLEST, len(lines) - 1):
+            end += 1
+            if lines[end].count('"') % 2:
+                row = lines[start : end + 1]
+                if not _HOLDS_A_NUMBER.search("\n".join(row)):
+                    lines[start : end + 1] = [""] * (end - start) + [" ".join(one.strip() for one in row)]
+                break
+        start = end + 1
+    return lines
 
 
 def _refuse_long_line(place: int) -> None:
