@@ -90,3 +90,11 @@ def test_names_that_matlab_does_not_allow_are_said(tmp_path: Path) -> None:
         match="variables of MATLAB have letters, digits and _ in their names: rig.angle is called rig_angle",
     ):
         tvident.FileRecording({"rig.angle [deg]": T}).write(tmp_path / "x.mat")
+
+
+def test_groups_that_were_sampled_together_have_one_clock() -> None:
+    times = np.arange(50) / 100
+    groups = {"left.time [s]": times, "left.angle": times, "right.time [s]": times.copy(), "right.angle": times}
+    assert tvident.FileRecording(groups).sample_rate == 100
+    apart = groups | {"right.time [s]": times + 0.005}
+    assert tvident.FileRecording(apart).time is None

@@ -181,7 +181,7 @@ class FileRecording(Mapping[str, Channel]):
 
     @property
     def time(self) -> npt.NDArray[np.float64] | None:
-        """Time of every sample in seconds, shape (n,); None where the file has no channel of times, or one in each of several groups.
+        """Time of every sample in seconds, shape (n,); None where the file has no channel of times, or several that differ.
 
         See Also
         --------
@@ -193,6 +193,8 @@ class FileRecording(Mapping[str, Channel]):
         # Structures and groups put their names before those of their channels.
         grouped = [name for name, values in long.items() if is_time(name.rpartition(".")[2], values.unit)]
         called = found[:1] or (grouped if len(grouped) == 1 else increasing_times(long))
+        # Groups that were sampled together have one clock.
+        called = called[:1] if all(np.array_equal(long[called[0]], long[name]) for name in called[1:]) else called
         return np.asarray(times_in_seconds(long[called[0]]), dtype=np.float64) if len(called) == 1 else None
 
     def select(self, t0: float, t1: float) -> FileRecording:
