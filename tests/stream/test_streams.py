@@ -374,3 +374,15 @@ def test_one_sample_takes_few_calls() -> None:
     finally:
         sys.setprofile(None)
     assert calls <= 20 * 600
+
+
+@pytest.mark.parametrize("rows", [10**14, 2**62])
+def test_windows_without_memory_are_refused(rows: int) -> None:
+    """Nothing is lost: the process goes on."""
+    sine = np.sin(np.arange(300) / 20)
+    with pytest.raises(MemoryError, match="memory"):
+        tvident.RollingStream(rows).push(sine, sine)
+    form = StrongForm(21, regression_window=rows)
+    windowed: dict[str, Any] = {"inertia": "windowed", "damping": "windowed", "terms": ()}
+    with pytest.raises(MemoryError, match="memory"):
+        tvident.IdentificationStream(sample_rate=100.0, method=form, **windowed)

@@ -213,7 +213,12 @@ impl RollingStream {
             None => RollingState::default(),
             Some((first, rows, given, ended)) => RollingState { first, rows: rows.as_slice()?.to_vec(), given, ended },
         };
-        Ok(Self { regressors, rhs_count, step, stream: Rolling::resume(plan, step, state) })
+        Ok(Self {
+            regressors,
+            rhs_count,
+            step,
+            stream: Rolling::resume(plan, step, state).map_err(|error| exception(&error))?,
+        })
     }
 
     /// Rows from one to its window.

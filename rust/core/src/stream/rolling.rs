@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::error::Error;
 use crate::lanes::output::Elements;
 use crate::least_squares::one_by_one::OneByOne;
 use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares};
@@ -45,19 +46,24 @@ pub struct RollingState {
 
 impl RollingStream {
     /// Begins a stream of every `step`-th window.
-    #[must_use]
-    pub fn new(plan: RollingLeastSquares, step: usize) -> Self {
+    ///
+    /// # Errors
+    /// If there is not the memory for the window.
+    pub fn new(plan: RollingLeastSquares, step: usize) -> Result<Self, Error> {
         Self::resume(plan, step, RollingState::default())
     }
 
     /// Goes on from a state of a stream with the same plan.
-    #[must_use]
-    pub fn resume(plan: RollingLeastSquares, step: usize, state: RollingState) -> Self {
+    ///
+    /// # Errors
+    /// As [`RollingStream::new`].
+    pub fn resume(plan: RollingLeastSquares, step: usize, state: RollingState) -> Result<Self, Error> {
+        plan.ask_for_scratch(1)?;
         let (columns, walk) = (plan.columns(), OneByOne::new(&plan));
         let rows = RecentRows::new(columns, state.first, state.rows);
         let end = state.ended.then(|| rows.len());
         let column = vec![Vec::new(); columns];
-        Self { plan, step, first: 0, end, rows, given: state.given, walk, side_by_side: None, column }
+        Ok(Self { plan, step, first: 0, end, rows, given: state.given, walk, side_by_side: None, column })
     }
 
     /// The same where equations begin with a row: those before it are ignored.

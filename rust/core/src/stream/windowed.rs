@@ -230,7 +230,7 @@ impl WindowedStream {
         let first = derivatives.before_centre();
         Ok(Self {
             rows: StreamedRows::resume(derivatives, motion, &state.rows)?,
-            windows: RollingStream::resume(plan, step, state.windows).with_equations_from(first),
+            windows: RollingStream::resume(plan, step, state.windows)?.with_equations_from(first),
             step,
             factors,
             scattering,

@@ -181,7 +181,7 @@ proptest! {
             let plan = plan();
             plan.solve(&equations, rows.clone(), regressions, &mut plan.scratch());
         });
-        let mut stream = RollingStream::new(plan(), step);
+        let mut stream = RollingStream::new(plan(), step).expect("memory");
         let mut found = regressions(p, q, &(0..0), step, |_| ());
         for piece in pieces(&lengths, rows.end) {
             let some: Vec<&[f64]> = slices.iter().map(|column| &column[piece.clone()]).collect();
@@ -191,7 +191,7 @@ proptest! {
             if resume && piece.end % 7 == 0 {
                 let state = stream.state();
                 prop_assert!(state.rows.len() <= 2 * window * (p + q));
-                stream = RollingStream::resume(plan(), step, state);
+                stream = RollingStream::resume(plan(), step, state).expect("memory");
             }
         }
         let rest = stream.at_end();
