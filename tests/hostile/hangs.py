@@ -43,8 +43,7 @@ CALLS = (
     "tvident.rolling_least_squares(x, x, {huge})",
     "tvident.RollingStream({huge}).push(x, x)",
     "tvident.LocalPolynomialStream({huge} // 2 * 2 + 1, sample_rate=100).push(x)",
-    "tvident.IdentificationStream(sample_rate=100, method=tvident.StrongForm(21, regression_window={huge}), "
-    "inertia='windowed', damping='windowed', terms=()).push(x, x)",
+    "tvident.IdentificationStream(sample_rate=100, method='paper', settings={{'regression_window': {huge}}}).push(x, x)",
     "tvident.identify(x, x, sample_rate=1000, step={huge}, method=tvident.WeakForm(window_length={huge} // 2 * 2 + 1))",
     "tvident.identify(x, x, sample_rate={extreme}, lag={extreme})",
     "tvident.simulate_torsional_rig(duration=.1, inertia={extreme})",

@@ -136,3 +136,28 @@ def test_what_cannot_be_aligned_is_said() -> None:
         tvident.identify(np.stack([angle] * 2), np.stack([sparse] * 2), sample_rate=1000)
     with pytest.raises(ValueError, match="align needs the weak form"):
         tvident.identify(angle, torque, sample_rate=1000, align="offset", method="paper")
+
+
+@pytest.mark.parametrize("lost", ["the torque's first half", "all of the torque"])
+def test_what_is_lost_of_a_channel_is_not_taken_for_a_clock(lost: str) -> None:
+    simulated = tvident.simulate_torsional_rig(duration=3.0, sample_rate=200.0)
+    torque = np.roll(simulated.torque, 7)
+    torque[: 300 if "half" in lost else None] = np.nan
+    times = simulated.time
+    found = tvident.identify(simulated.angle, torque, t=(times, times), align="offset")
+    offset, error = found.constants["clock_offset"]
+    if "half" in lost:
+        assert abs(offset - 7 / 200) < 4 * error < 0.002
+    else:
+        assert np.isnan(error)
+        assert not found.trusted.any()
+        assert any("how the clocks" in words for words in found.advice)
+
+
+def test_clocks_that_cannot_be_aligned_say_why() -> None:
+    simulated = tvident.simulate_torsional_rig(duration=3.0, sample_rate=200.0)
+    times = simulated.time
+    with pytest.raises(ValueError, match="a clock must go on where its stamps are moved"):
+        tvident.identify(simulated.angle, simulated.torque, t=(times, times), align=1e18)
+    with pytest.raises(ValueError, match="at least 64 samples"):
+        tvident.identify(simulated.angle[:20], simulated.torque[:20], t=(times[:20], times[:20]), align="drift")

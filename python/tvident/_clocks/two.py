@@ -78,6 +78,11 @@ class TwoClocks:
         offset, drift = late
         true = times - offset - drift * (times - self.start)
         places = (true - self.start) / self.period
+        if not np.all(np.diff(places) > 0):
+            raise ValueError(
+                f"a clock must go on where its stamps are moved; got stamps that are late by {offset:.3g} s and {drift:.3g} s more each "
+                "second; give align= in seconds, or times that are right"
+            )
         whole = np.rint(places)
         if float(np.abs(places - whole).max()) <= _SAME:
             places = whole

@@ -27,6 +27,9 @@ _MOST_LEFT = 0.7
 _PARTS, _SHORTEST = 6, 1500
 """Parts of a record whose lags tell a drift, and samples of the shortest."""
 
+_SHORTEST_SEARCH = 64
+"""Samples without which nothing is looked for: no equation holds for so few."""
+
 _ROUNDS = 3
 """Rounds of aligning with what was found."""
 
@@ -139,8 +142,12 @@ def _coarse(angle: npt.NDArray[np.number], torque: npt.NDArray[np.number]) -> tu
 
     The equation of motion in weak form, all constant, by least squares at every alignment: correlations with orthonormal columns.
     """
-    angle, torque = _filled(angle), _filled(torque)
-    samples = angle.size
+    there = np.flatnonzero(np.isfinite(angle) & np.isfinite(torque))
+    samples = 0 if there.size == 0 else int(there[-1] - there[0]) + 1
+    if samples < _SHORTEST_SEARCH:
+        return 0, math.inf
+    both = slice(there[0], there[-1] + 1)
+    angle, torque = _filled(angle[both]), _filled(torque[both])
     farthest = int(_FARTHEST * samples)
     half = _half_width(angle)
     x = np.arange(-half, half + 1) / half
@@ -173,7 +180,7 @@ def _half_width(angle: Numbers) -> int:
     # Noise makes neighbours differ too; a second difference of six times the variance of white noise tells how much.
     noise = float(changes @ changes) / 6
     frequency = math.sqrt(max(faster - 2 * noise, 0.0) / max(power, np.finfo(float).tiny))
-    return int(np.clip(math.pi / max(frequency, 1e-9), 8, angle.size // 16))
+    return int(np.clip(math.pi / max(frequency, 1e-9), 8, max(8, angle.size // 16)))
 
 
 def _filled(values: npt.NDArray[np.number]) -> Numbers:
