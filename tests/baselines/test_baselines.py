@@ -1,5 +1,6 @@
 """Methods that came before: against slow references and simulated truth."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -127,3 +128,33 @@ def test_methods_are_compared(tmp_path: Path) -> None:
 def test_what_does_not_fit_is_said(call: Any, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         call()
+
+
+ROWS = np.random.default_rng(0).standard_normal((50, 2))
+SUM = ROWS.sum(axis=1)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: baselines.recursive_least_squares(np.where(ROWS > 2, np.nan, ROWS), SUM), "finite numbers"),
+        (lambda: baselines.recursive_least_squares(ROWS[:0], SUM[:0]), "shape"),
+        (lambda: baselines.recursive_least_squares(ROWS, 1e300 * SUM), "finite numbers"),
+        (lambda: baselines.random_walk_smoother(ROWS, SUM, steps=["x", "y"], noise=1), "hold numbers"),  # type: ignore[arg-type]
+        (lambda: baselines.random_walk_smoother(ROWS, SUM, steps=[0.1], noise=1), "one for each of 2"),
+        (lambda: baselines.expanded_least_squares(ROWS, SUM, family="legendre", sizes=[1, 2.5]), "whole number"),
+        (lambda: baselines.tvarx(SUM, SUM.astype("U9"), 20, delta=0.1), "hold numbers"),
+        (lambda: baselines.tvarx(SUM, SUM[1:], 20, delta=0.1), "shape"),
+    ],
+)
+def test_wrong_calls_say_what_would_be_right(call: Callable[[], Any], words: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=words):
+        call()
+
+
+@pytest.mark.filterwarnings("error")
+def test_records_beyond_doubles_are_not_known() -> None:
+    """No warning of NumPy's is all that is said of them."""
+    large = SUM * 1e300
+    assert np.isnan(baselines.tvarx(large, large, 20, delta=0.1).values).all()
+    assert not np.isfinite(baselines.chebyshev_derivatives(SUM * 1e300, 20, delta=1e-300)[2]).any()

@@ -19,6 +19,7 @@ _ORDERS = 3
 _PIECE = 1 << 14
 
 
+@np.errstate(all="ignore")  # what leaves the range of doubles is not known
 def chebyshev_derivatives(samples: npt.ArrayLike, size: int, *, delta: float) -> Array:
     """Return a record and two derivatives from its projection on Chebyshev polynomials over its whole length.
 
@@ -73,6 +74,7 @@ def chebyshev_derivatives(samples: npt.ArrayLike, size: int, *, delta: float) ->
     return np.stack([chebyshev.chebval(x, chebyshev.chebder(found, d)) * scale**d for d in range(_ORDERS)])
 
 
+@np.errstate(all="ignore")  # what leaves the range of doubles is not known
 def lanczos_derivatives(samples: npt.ArrayLike, window_length: int, *, delta: float) -> Array:
     """Return a record and two derivatives by integrals with Legendre polynomials (Lanczos): f′ is about 3/(2h³) ∫ t f(x + t) dt.
 

@@ -13,6 +13,7 @@ from tvident._baselines.recursive import Tracked
 Array: TypeAlias = npt.NDArray[np.float64]
 
 
+@np.errstate(all="ignore")  # what leaves the range of doubles is not known
 def tvarx(
     angle: npt.ArrayLike, torque: npt.ArrayLike, window: int, *, delta: float, degree: int = 1, every: int = 1
 ) -> Tracked:
@@ -63,12 +64,12 @@ def tvarx(
     True
     """
     period = arguments.positive_number("delta", delta) * arguments.whole_number("every", every, least=1)
-    each = np.asarray(arguments.channel("angle", angle), np.float64)
-    samples = each.size
+    both = [np.asarray(one, np.float64) for one in arguments.channels(angle=angle, torque=torque)]
+    if both[0].ndim != 1:
+        raise ValueError(f"angle and torque must be one record; got shape {both[0].shape}; take one of them")
+    samples = both[0].size
     count = samples // every
-    place, force = (
-        np.asarray(one, np.float64)[: count * every].reshape(count, every).mean(axis=1) for one in (each, torque)
-    )
+    place, force = (one[: count * every].reshape(count, every).mean(axis=1) for one in both)
     rows = max(1, window // every)
     terms = 6 * (arguments.whole_number("degree", degree, least=0) + 1)
     if not terms < rows <= count:
@@ -86,6 +87,8 @@ def tvarx(
         some = slice(middle - rows // 2, middle - rows // 2 + rows)
         within = np.linspace(-1, 1, past[some].shape[0])
         design = np.concatenate([past[some] * within[:, np.newaxis] ** power for power in range(degree + 1)], axis=1)
+        if not (np.isfinite(design).all() and np.isfinite(target[some]).all()):
+            continue
         factor = np.linalg.lstsq(design, target[some], rcond=None)[0][:6] / np.where(scale > 0, scale, 1)
         found[middle + 2] = _continuous(factor, period)
     known = middles + 2

@@ -44,6 +44,7 @@ class Tracked(NamedTuple):
     stderr: Array
 
 
+@np.errstate(all="ignore")  # small numbers may leave the range of doubles
 def recursive_least_squares(regressors: npt.ArrayLike, rhs: npt.ArrayLike, *, forgetting: float = 0.99) -> Tracked:
     """Return least squares of the past, in which every row counts less the older it is.
 
@@ -84,7 +85,7 @@ def recursive_least_squares(regressors: npt.ArrayLike, rhs: npt.ArrayLike, *, fo
     array([[2., 3.],
            [5., 3.]])
     """
-    design, right = _rows(regressors, rhs)
+    design, right = rows_of_numbers(regressors, rhs)
     forgetting = arguments.finite_number("forgetting", forgetting, least=1e-6, most=1)
     scale = _scales(design)
     size = design.shape[1]
@@ -107,6 +108,7 @@ def recursive_least_squares(regressors: npt.ArrayLike, rhs: npt.ArrayLike, *, fo
     return Tracked(values, errors)
 
 
+@np.errstate(all="ignore")  # small numbers may leave the range of doubles
 def random_walk_smoother(
     regressors: npt.ArrayLike, rhs: npt.ArrayLike, *, steps: npt.ArrayLike, noise: float
 ) -> Tracked:
@@ -150,13 +152,14 @@ def random_walk_smoother(
     >>> bool(np.abs(found.values[:, 0] - changing).max() < 0.05), found.values[0, 1].round(2).item()
     (True, 3.0)
     """
-    design, right = _rows(regressors, rhs)
+    design, right = rows_of_numbers(regressors, rhs)
     scale = _scales(design)
-    walk = np.diag((np.asarray(steps, np.float64) * scale) ** 2)
-    if walk.shape != (design.shape[1], design.shape[1]):
+    each = arguments.any_array("steps", steps).astype(np.float64)
+    if each.shape != design.shape[1:] or not (np.abs(each) <= arguments.LARGEST).all():
         raise ValueError(
-            f"steps must be one for each of {design.shape[1]} parameters; got {np.shape(steps)}; give 0 for constants"
+            f"steps must be one for each of {design.shape[1]} parameters; got shape {each.shape}; give 0 for constants"
         )
+    walk = np.diag((each * scale) ** 2)
     variance = arguments.positive_number("noise", noise) ** 2
     count, size = design.shape
     means, spreads = np.empty((count, size)), np.empty((count, size, size))
@@ -171,19 +174,31 @@ def random_walk_smoother(
         spread = kept @ spread @ kept.T + variance * np.outer(gain, gain)
         means[row], spreads[row] = now, spread
     for row in range(count - 2, -1, -1):
-        back = np.linalg.solve(spreads[row] + walk, spreads[row]).T
+        try:
+            back = np.linalg.solve(spreads[row] + walk, spreads[row]).T
+        except np.linalg.LinAlgError:
+            raise ValueError(
+                f"noise must be large enough for the digits of numbers; got {noise:g}; give that of the right-hand side"
+            ) from None
         means[row] += back @ (means[row + 1] - means[row])
         spreads[row] += back @ (spreads[row + 1] - spreads[row] - walk) @ back.T
     errors = np.sqrt(np.maximum(np.einsum("ijj->ij", spreads), 0))
     return Tracked(means / scale, errors / scale)
 
 
-def _rows(regressors: npt.ArrayLike, rhs: npt.ArrayLike) -> tuple[Array, Array]:
-    design, right = np.asarray(regressors, np.float64), np.asarray(rhs, np.float64)
-    if design.ndim != 2 or right.shape != design.shape[:1]:  # noqa: PLR2004 - rows and columns
+def rows_of_numbers(regressors: npt.ArrayLike, rhs: npt.ArrayLike) -> tuple[Array, Array]:
+    """Return regressors and right-hand sides, checked."""
+    design = arguments.any_array("regressors", regressors).astype(np.float64)
+    right = arguments.any_array("rhs", rhs).astype(np.float64)
+    if design.ndim != 2 or right.shape != design.shape[:1] or not right.size:  # noqa: PLR2004 - rows and columns
         raise ValueError(
             f"regressors must be of shape (n, p) and the right-hand side (n,); got {design.shape} and {right.shape}; transpose them"
         )
+    for name, one in (("regressors", design), ("rhs", right)):
+        if not (np.abs(one) <= arguments.LARGEST).all():
+            raise ValueError(
+                f"{name} must hold finite numbers of at most {arguments.LARGEST:g}; got others; leave these rows out"
+            )
     return design, right
 
 

@@ -7,7 +7,8 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from tvident._baselines.recursive import Tracked
+from tvident import _arguments as arguments
+from tvident._baselines.recursive import Tracked, rows_of_numbers
 from tvident._expansion import Expansion
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -57,9 +58,9 @@ def expanded_least_squares(
     >>> bool(np.allclose(found.values[:, 0], 3)), bool(np.allclose(found.values[:, 1], changing))
     (True, True)
     """
-    design, right = np.asarray(regressors, np.float64), np.asarray(rhs, np.float64)
-    each = [int(one) for one in np.ravel(np.asarray(sizes))]
-    if design.ndim != 2 or len(each) != design.shape[1]:  # noqa: PLR2004 - rows and columns
+    design, right = rows_of_numbers(regressors, rhs)
+    each = [arguments.whole_number("sizes", one, least=1) for one in np.ravel(np.asarray(sizes, object))]
+    if len(each) != design.shape[1]:
         raise ValueError(
             f"sizes must be one for each column of regressors; got {len(each)} for {design.shape}; give 1 for constants"
         )
