@@ -140,7 +140,7 @@ SUM = ROWS.sum(axis=1)
         (lambda: baselines.recursive_least_squares(np.where(ROWS > 2, np.nan, ROWS), SUM), "finite numbers"),
         (lambda: baselines.recursive_least_squares(ROWS[:0], SUM[:0]), "shape"),
         (lambda: baselines.recursive_least_squares(ROWS, 1e300 * SUM), "finite numbers"),
-        (lambda: baselines.random_walk_smoother(ROWS, SUM, steps=["x", "y"], noise=1), "hold numbers"),  # type: ignore[arg-type]
+        (lambda: baselines.random_walk_smoother(ROWS, SUM, steps=["x", "y"], noise=1), "hold numbers"),
         (lambda: baselines.random_walk_smoother(ROWS, SUM, steps=[0.1], noise=1), "one for each of 2"),
         (lambda: baselines.expanded_least_squares(ROWS, SUM, family="legendre", sizes=[1, 2.5]), "whole number"),
         (lambda: baselines.tvarx(SUM, SUM.astype("U9"), 20, delta=0.1), "hold numbers"),

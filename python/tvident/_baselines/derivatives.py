@@ -70,7 +70,7 @@ def chebyshev_derivatives(samples: npt.ArrayLike, size: int, *, delta: float) ->
         design = np.column_stack([chebyshev.chebvander(x[some], size - 1), record[some]])
         factor = np.asarray(np.linalg.qr(np.concatenate([factor, design]), mode="r"), np.float64)
     found = np.linalg.solve(factor[:size, :size], factor[:size, size])
-    scale = 2 / (period * (record.size - 1))
+    scale = np.float64(2) / (period * (record.size - 1))
     return np.stack([chebyshev.chebval(x, chebyshev.chebder(found, d)) * scale**d for d in range(_ORDERS)])
 
 
