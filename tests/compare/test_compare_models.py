@@ -188,3 +188,12 @@ def test_the_command_compares(tmp_path: Path) -> None:
         "'cubic"
     ) or "cubic" in done.stdout
     assert run(*call[:6]).returncode == 2
+
+
+def test_models_of_nothing_have_no_score() -> None:
+    still = np.zeros(100)
+    compared = tvident.compare_models(still, np.random.default_rng(0).standard_normal(100), sample_rate=100.0)
+    assert np.isinf(compared.table["aicc"]).all()
+    assert not compared.table["weight"].any()
+    assert np.isnan(compared.averaged["stiffness"][0]).all()
+    assert "nan" in compared.summary()

@@ -174,3 +174,18 @@ def test_the_command(tmp_path: Any) -> None:
     assert "stiffness within 2 %: reached already; expected of 64 s in all:" in more.stdout
     known = run("plan", str(tmp_path / "one.npz"), "--wanted", "0.00001")
     assert "cannot be reached by recording longer" in known.stdout
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    "name", ["inertia", "damping", "stiffness", "torque_noise", "angle_noise", "duration", "wanted"]
+)
+@pytest.mark.parametrize("value", [1e-300, 1e-24, 1e24, 1e300])
+def test_numbers_at_the_limits_of_doubles_are_refused_or_planned(name: str, value: float) -> None:
+    guess: dict[str, Any] = {"inertia": 0.01, "damping": 0.01, "stiffness": 0.4, "band": (1, 10), "torque_noise": 0.01}
+    try:
+        plan = tvident.plan_experiment(**{**guess, "duration": 10.0, name: value})
+    except ValueError as refused:
+        assert "; take other units" in str(refused) or "; check the units" in str(refused)  # noqa: PT017 - or none
+    else:
+        assert np.isfinite([plan.duration, plan.torque_rms, plan.angle_rms, *plan.errors.values()]).all()

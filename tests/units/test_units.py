@@ -217,3 +217,17 @@ def test_slices_keep_their_unit_and_what_is_computed_has_none() -> None:
     np.testing.assert_allclose(turned, np.deg2rad(np.arange(10.0)))
     with pytest.raises(ValueError, match="one of the same quantity; got 'deg' and 'N m'"):
         angle.to("N m")
+
+
+@pytest.mark.parametrize("unit", [5, None, (), b"rad", [1]])
+def test_a_unit_is_a_text(unit: object) -> None:
+    with pytest.raises(TypeError, match="a unit must be a text"):
+        Channel(np.zeros(3), "rad").to(unit)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="a unit must be a text"):
+        Channel(np.zeros(3), unit)  # type: ignore[arg-type]
+
+
+def test_a_unit_that_is_long_makes_no_long_message() -> None:
+    with pytest.raises(ValueError, match="same quantity") as refused:
+        Channel(np.zeros(3), "x" * 5000).to("rad")
+    assert len(str(refused.value)) < 200

@@ -41,6 +41,8 @@ def untold_lag(found: _core.Identification, names: Sequence[str], period: float)
     changed = []
     for place, by_sample in found.with_lag:
         one, change = found.unknowns[place], abs(_HALF * by_sample)
+        if not np.isfinite(one.values).any() or not np.isfinite(one.stderr).any():
+            continue
         value, error = np.nanmedian(np.abs(one.values)), np.nanmedian(one.stderr) * one.factor
         if names[place] in COEFFICIENTS and change > max(_LEAST_ERRORS * error, _LEAST_PART * value):
             changed.append(f"{names[place]} by {100 * change / value:.2g} %")

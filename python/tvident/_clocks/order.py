@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _arguments as arguments
 from tvident import _core
 from tvident._clocks.grid import Grid, Numbers
 from tvident._clocks.missing import LEAST_BRIDGED
@@ -36,6 +37,7 @@ _LEAST = 1e-24
 """Of the mean square of a channel: errors below this are rounding."""
 
 
+@np.errstate(all="ignore")
 def chosen_order(grid: Grid, channels: Mapping[str, npt.NDArray[np.number]]) -> int:
     """Return the order with the least errors of all channels.
 
@@ -48,8 +50,8 @@ def chosen_order(grid: Grid, channels: Mapping[str, npt.NDArray[np.number]]) -> 
     by_order = [middle.resampled(order, grid.bridged) for order in (*_ORDERS, _JUDGE)]
     gains = [middle.resampling(order, grid.bridged).gain() for order in _ORDERS]
     # What differs between two orders in the channels, and in noise of variance one.
-    changes = [np.nanmean((one - other) ** 2, axis=1) for one, other in pairwise(by_order)]
-    squares = np.nanmean(by_order[0][:-1] ** 2, axis=1)
+    changes = [_mean_square(one - other) for one, other in pairwise(by_order)]
+    squares = _mean_square(by_order[0][:-1])
     # The noise of a channel is at most what makes the two highest orders differ.
     noise = changes[-1][:-1] / changes[-1][-1]
     scores = []
@@ -59,6 +61,7 @@ def chosen_order(grid: Grid, channels: Mapping[str, npt.NDArray[np.number]]) -> 
     return _ORDERS[int(np.argmin(scores))]
 
 
+@np.errstate(all="ignore")
 def longest_bridged(grid: Grid, channels: Mapping[str, npt.NDArray[np.number]], order: int) -> float:
     """Return the longest step in periods that a spline may go over: as long as it predicts samples that are left out there.
 
@@ -71,16 +74,23 @@ def longest_bridged(grid: Grid, channels: Mapping[str, npt.NDArray[np.number]], 
     middle = Middle.of(grid, channels)
     every = middle.resampled(order, grid.bridged)
     judge = middle.resampled(_JUDGE, grid.bridged)
-    change = np.nanmean((every - judge) ** 2, axis=1)
+    change = _mean_square(every - judge)
     noise = change[:-1] / change[-1] if change[-1] > 0 else np.zeros(change.size - 1)
-    squares = np.nanmean(every[:-1] ** 2, axis=1)
+    squares = _mean_square(every[:-1])
     for lost in range(1, math.floor(grid.bridged)):
         kept = np.arange(middle.places.size) % (_APART * lost) >= lost
         holed = Middle(middle.places[kept], middle.samples, middle.rows[:, kept])
-        wrong = np.nanmean(_missed(holed, middle, kept, order) ** 2, axis=1)
+        wrong = _mean_square(_missed(holed, middle, kept, order))
         if (wrong[:-1] > _EXPLAINED * noise * wrong[-1] + _SEEN**2 * squares).any():
             return max(float(lost), LEAST_BRIDGED)
     return grid.bridged
+
+
+def _mean_square(rows: Numbers) -> Numbers:
+    """Return the mean square of what is known of every row; NaN where nothing is."""
+    counts = np.isfinite(rows).sum(axis=1)
+    sums = np.sum(np.where(np.isfinite(rows), rows, 0.0) ** 2, axis=1)
+    return np.asarray(np.where(counts > 0, sums / np.maximum(counts, 1), np.nan))
 
 
 def _missed(holed: Middle, middle: Middle, kept: npt.NDArray[np.bool_], order: int) -> Numbers:
@@ -115,7 +125,10 @@ class Middle:
         places = grid.places[part] - np.ceil(grid.places[part][0])
         rows = [row[part] for values in channels.values() for row in values.reshape(-1, values.shape[-1])[:_RECORDS]]
         noise = np.random.default_rng(0).standard_normal(places.size)
-        return cls(places, math.floor(places[-1]) + 1, np.stack([*rows, noise]).astype(np.float64))
+        every = np.stack([*rows, noise]).astype(np.float64)
+        # What the core takes for no number is none here.
+        every[~(np.abs(every) <= arguments.LARGEST)] = np.nan
+        return cls(places, math.floor(places[-1]) + 1, every)
 
     def resampling(self, order: int, bridged: float) -> _core.Resampling:
         """Return how it is brought onto the grid."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -71,7 +72,10 @@ class ModelComparison:
         squares = [_mean_square(result) for result in results.values()]
         counts = np.array([effective_parameters(result, samples) for result in results.values()])
         pairs = zip(squares, counts.tolist(), strict=True)
-        scores = np.array([aicc(square, self.observations, count) for square, count in pairs])
+        # A model of which nothing was found has no score.
+        scores = np.array(
+            [aicc(square, self.observations, count) if math.isfinite(count) else math.inf for square, count in pairs]
+        )
         weights = akaike_weights(scores)
         order = np.argsort(scores, kind="stable")
         names = list(results)

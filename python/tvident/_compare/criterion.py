@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TypeAlias
 
 import numpy as np
@@ -13,7 +14,10 @@ Array: TypeAlias = npt.NDArray[np.float64]
 
 
 def effective_parameters(result: Identification, samples: int) -> float:
-    """Return how many parameters were estimated: one for a constant; for a windowed one as many as windows have coefficients."""
+    """Return how many parameters were estimated: one for a constant; for a windowed one as many as windows have coefficients.
+
+    Where no window was long enough for anything it is not known (NaN).
+    """
     settings, count = result.settings, float("angle_zero" in result.constants)
     known = settings["known"]
     for name in ("inertia", "damping", "stiffness", *result.terms):
@@ -22,7 +26,9 @@ def effective_parameters(result: Identification, samples: int) -> float:
         if name in result.constants:
             count += 1
         else:
-            count += samples / settings["regression_window"] * (2 if settings["variation"] == "linear" else 1)
+            window = settings["regression_window"]
+            windows = samples / window if isinstance(window, int) else math.nan
+            count += windows * (2 if settings["variation"] == "linear" else 1)
     return count + len(settings["inner"])
 
 

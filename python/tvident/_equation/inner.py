@@ -101,9 +101,9 @@ def expected_stribeck(velocity: Any, errors: Any, scale: float) -> Any:
     scale : float
         The Stribeck velocity in rad/s; infinite for the sign alone.
     """
-    faded = 1 / (1 + 2 * (errors / scale) ** 2)
-    left = np.sqrt(faded) * np.exp(-faded * (velocity / scale) ** 2)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
+        faded = 1 / (1 + 2 * (errors / scale) ** 2)
+        left = np.sqrt(faded) * np.exp(-faded * (velocity / scale) ** 2)
         certain = np.abs(velocity) * np.sqrt(faded) / (errors * np.sqrt(2.0))
     sign = np.sign(velocity)
     near = np.flatnonzero(certain < _CERTAIN)

@@ -50,8 +50,9 @@ def pseudo_values(
         left = rhs - solve(clipped)
         limits = LIMIT * _scales(left, is_used, length)
         there = np.isfinite(left) & np.isfinite(limits)
-        moved = np.where(there, rhs - left + np.clip(left, -limits, limits), rhs)
-        change = np.abs(moved - clipped)[there & is_used[:, None]]
+        with np.errstate(invalid="ignore"):  # right-hand sides that are infinite stay as they are
+            moved = np.where(there, rhs - left + np.clip(left, -limits, limits), rhs)
+            change = np.abs(moved - clipped)[there & is_used[:, None]]
         allowed = (_SETTLED * limits / LIMIT)[there & is_used[:, None]]
         clipped = moved
         if (change <= allowed).all():

@@ -256,6 +256,7 @@ class _Pair:
     period: float
     noises: tuple[float, float]
 
+    @np.errstate(all="ignore")  # of numbers at the limits of doubles nothing is known
     def judged(self) -> _Judged:
         """Return the bias of the channel, or what is wrong with it."""
         noises = self.noises

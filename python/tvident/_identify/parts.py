@@ -99,7 +99,10 @@ def requested(
             raise TypeError(
                 f"{name} of a long record must be a number or a kind; got {arguments.shown(value)}; give a number"
             )
-    for term in given.get("terms") or ():
+    terms = given.get("terms")
+    if terms is not None and (isinstance(terms, str) or not isinstance(terms, Sequence)):
+        raise TypeError(f"terms must be a list; got {arguments.shown(terms)}; write terms=['offset', 'coulomb']")
+    for term in terms or ():
         own = term[0] if isinstance(term, tuple | list) and term else term
         if isinstance(own, Term):
             raise TypeError(

@@ -205,7 +205,7 @@ def _factor_of(name: str, values: Any, axis: Axis) -> float:
 
 def _in_units_of_results(name: str, value: float | None, factor: float) -> float | None:
     """Return what was given in the unit of the angle in that of results."""
-    return value if value is None or factor == 1 else arguments.finite_number(name, value) * factor
+    return None if value is None else arguments.finite_number(name, value) * factor
 
 
 def _known(name: str, value: Any, axis: Axis) -> Any:

@@ -420,7 +420,8 @@ class Task:
             used["windows_near"] = by_record([one.near for one in found])
             used["tested"] = tested_in_order(self._unknowns, found, request)
             used["angle_zero"] = by_record([0.0 if one.angle_zero is None else one.angle_zero.value for one in found])
-            used["shown_noise"] = [one.shown_noise for one in found if one.shown_noise is not None] or None
+            noises = [one.shown_noise for one in found if one.shown_noise is not None]  # infinite of a channel of NaN
+            used["shown_noise"] = [one if one < np.inf else 0.0 for one in noises] or None
             used["variation"] = request.form.variation.replace("auto", "linear")
             if request.lag == "auto" or "lag" in request.kept:
                 chosen.append("lag")

@@ -69,11 +69,14 @@ def weights_of(given: npt.ArrayLike | None, shape: tuple[int, ...], beside: Mapp
             )
     is_one = arguments.any_array("weights", given).ndim == 1
     found = np.broadcast_to(_checked(given, shape[-1:] if is_one else shape), shape)
-    counted = found > 0
-    means = found.sum(axis=-1, keepdims=True) / np.maximum(counted.sum(axis=-1, keepdims=True), 1)
-    greatest = found.max(axis=-1, keepdims=True)
-    alike = np.where(counted, found, greatest).min(axis=-1, keepdims=True) == greatest
-    relative = found / np.where(means > 0, means, 1)
+    with np.errstate(under="ignore"):
+        # Sums of weights may be beyond doubles: powers of two bring the greatest near one, without rounding.
+        found = np.ldexp(found, -np.frexp(found.max(axis=-1, keepdims=True))[1])
+        counted = found > 0
+        means = found.sum(axis=-1, keepdims=True) / np.maximum(counted.sum(axis=-1, keepdims=True), 1)
+        greatest = found.max(axis=-1, keepdims=True)
+        alike = np.where(counted, found, greatest).min(axis=-1, keepdims=True) == greatest
+        relative = found / np.where(means > 0, means, 1)
     return Weights(np.ascontiguousarray(np.where(alike & counted, 1.0, relative)))
 
 

@@ -14,6 +14,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _arguments as arguments
 from tvident._merged.merging import Part
 from tvident._results import correlated_with, kernels_of, touched_by
 
@@ -50,6 +51,7 @@ class _WindowsOfPart:
     alone: Array
 
 
+@np.errstate(all="ignore")  # large numbers may leave the range of doubles
 def undetermined(part: Part, period: float) -> dict[str, str]:
     """Return the elements of a part that only noise tells from others, and why.
 
@@ -126,10 +128,13 @@ def _rows(part: Part, names: list[str], period: float) -> tuple[list[Array], Arr
     noises = np.einsum("c,aeci,ij,becj->eab", angles, each, gram, each)
     rows, stride = [], _stride(part)
     for trial in equations.trials:
-        motion = [correlated_with(np.nan_to_num(np.asarray(one, np.float64)), kernels) for one in trial[0]]
         terms = [] if trial[2] is None else [np.asarray(one, np.float64) for one in trial[2]]
-        averages = [correlated_with(np.nan_to_num(one), kernels[2:])[0] for one in terms]
-        there = np.isfinite(np.stack([*np.asarray(trial[0], np.float64), *terms])).all(axis=0)
+        samples = np.stack([*np.asarray(trial[0], np.float64), *terms])
+        is_number = np.abs(samples) <= arguments.LARGEST  # as the core sees it
+        samples = np.where(is_number, samples, 0.0)
+        motion = [correlated_with(one, kernels) for one in samples[: len(trial[0])]]
+        averages = [correlated_with(one, kernels[2:])[0] for one in samples[len(trial[0]) :]]
+        there = is_number.all(axis=0)
         usable = ~touched_by(np.asarray(~there), half)
         wanted = slice(half, None, stride)
         columns = np.zeros((count, len(names), usable[wanted].size))
@@ -175,9 +180,9 @@ def _in_windows(rows: list[Array], noises: Array, windowed: int, length: int) ->
 
 def _lost(products: Array, noise: Array, scale: Array) -> Array:
     """Return the combinations of scaled columns that are mostly noise, one a column."""
-    if not len(scale):
-        return np.zeros((0, 0))
     both = np.outer(scale, scale)
+    if not len(scale) or not np.isfinite([products / both, noise / both]).all():
+        return np.zeros((len(scale), 0))
     values, vectors = np.linalg.eigh(products / both)
     whole = values > np.finfo(float).eps * len(scale) * values[-1]
     root = vectors[:, whole] / np.sqrt(values[whole])

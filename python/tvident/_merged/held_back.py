@@ -117,7 +117,8 @@ def _simulated(merging: Merging, values: Mapping[str, Array], window_length: int
             true, found = angles[:, first:end], found[:, first - begin :]
             there = np.isfinite(true) & np.isfinite(found)
             left += np.sum(np.where(there, (true - found) ** 2, 0.0), axis=1)
-            mean = np.mean(true, axis=1, where=there, keepdims=True)
+            counts = np.maximum(there.sum(axis=1, keepdims=True), 1)
+            mean = np.sum(np.where(there, true, 0.0), axis=1, keepdims=True) / counts
             spread += np.sum(np.where(there, (true - mean) ** 2, 0.0), axis=1)
     shares = 100 * (1 - left / spread)
     return shares if np.isfinite(shares).all() else nothing

@@ -370,12 +370,18 @@ def unknowable_of(masses: Masses, elements: Sequence[Element]) -> dict[str, str]
     return found
 
 
+def _finite(values: Any) -> npt.NDArray[np.float64]:
+    """Return samples with zero where the core sees no number."""
+    array = np.asarray(values, np.float64)
+    return np.where(np.abs(array) <= arguments.LARGEST, array, 0.0)
+
+
 def _dependent(masses: Masses, equations: Sequence[int]) -> str | None:
     """Return why full rows cannot be known: forces that depend on each other let one row be added to another."""
     free = {mass for mass in range(masses.count) if mass not in equations}
     if not free or len(equations) > 1:
         return None
-    here = np.nan_to_num(np.asarray(masses.torques[equations[0]], np.float64))
+    here = _finite(masses.torques[equations[0]])
     silent = [mass for mass in sorted(free) if mass in masses.measured and mass not in masses.driven]
     if silent:
         return (
@@ -383,8 +389,11 @@ def _dependent(masses: Masses, equations: Sequence[int]) -> str | None:
             "many independent forces as masses are needed for full matrices; use structure=tvident.Chain(…)"
         )
     for mass in sorted(free & set(masses.driven)):
-        other = np.nan_to_num(np.asarray(masses.torques[mass], np.float64))
-        both = float(here @ other) ** 2 / (float(here @ here) * float(other @ other))
+        other = _finite(masses.torques[mass])
+        # Of forces of size one: squares of large ones leave the range of doubles.
+        sizes = [max(float(np.linalg.norm(one, np.inf)), np.finfo(float).tiny) for one in (here, other)]
+        one, two = here / sizes[0], other / sizes[1]
+        both = float(one @ two) ** 2 / max(float(one @ one) * float(two @ two), np.finfo(float).tiny)
         if 1 - both < _DEPENDENT:
             return (
                 f"the forces on masses {equations[0]} and {mass} depend on each other (correlation {both**0.5:.3f}): "

@@ -94,6 +94,7 @@ def _interpolated(at: npt.NDArray[np.intp], times: npt.NDArray[np.intp], values:
     return np.asarray(np.interp(at, times, values))
 
 
+@np.errstate(all="ignore")  # where a mode is not known, nothing is divided
 def _tracked(poles: Complex, shapes: Complex, lefts: Complex) -> tuple[Complex, Complex, Complex]:
     """Put the modes of every time in the order of those before: of the same pole and shape."""
     poles, shapes, lefts = poles.copy(), shapes.copy(), lefts.copy()

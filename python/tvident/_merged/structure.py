@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, Literal, TypeAlias
@@ -268,7 +268,7 @@ def _links(name: str, links: Sequence[Link], masses: int) -> tuple[Link, ...]:
     """Return pairs of masses, checked."""
     found: list[Link] = []
     for link in links:
-        if isinstance(link, str) or len(link) != _LEAST_PAIR:
+        if isinstance(link, str) or not isinstance(link, Sized) or len(link) != _LEAST_PAIR:
             raise ValueError(
                 f"{name} must be pairs; got {arguments.shown(link)}; give pairs such as ('base', 0) or (0, 1)"
             )

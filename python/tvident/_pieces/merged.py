@@ -150,11 +150,12 @@ class Moved:
 
     def of(self, value: Numbers, error: Numbers, shared: Numbers) -> tuple[Numbers, Numbers]:
         """Return a windowed parameter and its error, where `shared` are its covariances with the constants, shape (constants, n)."""
-        slopes = self.inverse @ shared
-        variance = error**2 - (slopes * shared).sum(axis=0)
-        # Rounding may leave less than nothing of a variance that is all of the constants.
-        variance = np.maximum(variance, 0.0) + (slopes * (self.covariance @ slopes)).sum(axis=0)
-        return value + self.shift @ slopes, np.sqrt(variance)
+        with np.errstate(all="ignore"):  # where a piece knows nothing
+            slopes = self.inverse @ shared
+            variance = error**2 - (slopes * shared).sum(axis=0)
+            # Rounding may leave less than nothing of a variance that is all of the constants.
+            variance = np.maximum(variance, 0.0) + (slopes * (self.covariance @ slopes)).sum(axis=0)
+            return value + self.shift @ slopes, np.sqrt(variance)
 
 
 def moved(note: Note, means: Mapping[str, Mean]) -> tuple[list[str], Moved] | None:

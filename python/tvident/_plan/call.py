@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from numbers import Real
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +21,9 @@ _GRID = 60
 
 _SPREAD = 12
 """Frequencies over which half of the power is spread evenly."""
+
+_SMALLEST = 1e-24
+"""The smallest number that is taken, and one over the largest: eighth powers stay within doubles."""
 
 _LEAST_SHARE = 0.01
 """Lines with less than this part of the power are left out."""
@@ -132,6 +136,8 @@ def plan_experiment(
         return _longer(result, wanted, arguments.positive_number("more", more))
     given = {"inertia": inertia, "damping": damping, "stiffness": stiffness, "torque_noise": torque_noise}
     numbers = {name: _needed(name, one) for name, one in given.items()}
+    _check_size(given | {"wanted": wanted, "angle_noise": angle_noise or None, "sample_rate": sample_rate})
+    _check_size({"duration": duration, "torque_rms": torque_rms, "resolution": resolution})
     rate = arguments.positive_number("sample_rate", sample_rate)
     low, high = _band(band, rate)
     axis = axis_of(None, None, angle_unit=angle_unit, torque_unit=torque_unit)
@@ -180,10 +186,20 @@ def _needed(name: str, value: float | None) -> float:
     return arguments.positive_number(name, value)
 
 
+def _check_size(numbers: Mapping[str, float | None]) -> None:
+    """Check that powers of numbers stay within doubles: of machines they do."""
+    for name, number in numbers.items():
+        if number is not None and isinstance(number, Real) and number > 0 and not _SMALLEST <= number <= 1 / _SMALLEST:
+            raise ValueError(
+                f"{name} must be between {_SMALLEST:g} and {1 / _SMALLEST:g}; got {arguments.shown(number)}; take other units"
+            )
+
+
 def _band(band: Sequence[float] | None, rate: float) -> tuple[float, float]:
     if band is None or len(band) != 2:  # noqa: PLR2004 - its ends
         raise ValueError(f"band must be the lowest and the highest frequency; got {band}; give band=(0.5, 12), say")
     low, high = (arguments.positive_number("band", one) for one in band)
+    _check_size({"band": low})
     if not low < high < rate / 2:
         raise ValueError(
             f"band must rise, and end below half the sample rate of {rate:g} Hz; got {low:g} to {high:g} Hz; narrow it"

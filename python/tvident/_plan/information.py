@@ -64,13 +64,24 @@ def variances(information: Array, samples: float, window: float | None) -> Array
         None where the stiffness is constant.
     """
     if window is None or window >= samples:
-        return np.asarray(np.diag(np.linalg.inv(information * samples)))
+        return np.asarray(np.diag(_inverse(information * samples)))
     constants = slice(0, 2)
     across, own = information[constants, 2], information[2, 2]
     rest = information[constants, constants] - np.outer(across, across) / own
-    covariance = np.linalg.inv(rest * samples)
+    covariance = _inverse(rest * samples)
     passed_on = across @ covariance @ across / own**2
     return np.array([*np.diag(covariance), 1 / (window * own) + passed_on])
+
+
+def _inverse(information: Array) -> Array:
+    """Return the covariance that information gives."""
+    try:
+        return np.asarray(np.linalg.inv(information))
+    except np.linalg.LinAlgError:
+        raise ValueError(
+            "a plan needs parameters that a torque tells apart; got some that are far too small or large beside the others; "
+            "check the units of inertia=, damping=, stiffness= and band="
+        ) from None
 
 
 def best_powers(information: Array, parameters: Array) -> Array:
@@ -81,7 +92,7 @@ def best_powers(information: Array, parameters: Array) -> Array:
     weight = np.array([_OTHERS, _OTHERS, 1.0]) / parameters**2
     share = np.full(len(information), 1 / len(information))
     for _ in range(_ROUNDS):
-        inverse = np.linalg.inv(np.einsum("f,fij->ij", share, information))
+        inverse = _inverse(np.einsum("f,fij->ij", share, information))
         gain = np.einsum("i,ij,fjk,ki->f", weight, inverse, information, inverse)
         share = share * np.sqrt(gain)
         share /= share.sum()

@@ -238,7 +238,8 @@ def rolling_least_squares(
     every = arguments.whole_number("step", step, least=1)
     weight = arguments.weights("weights", weights, (rows,))
     largest = 1.0 if weight is None else float(weight.max())
-    relative = None if weight is None else weight / largest
+    with np.errstate(under="ignore"):
+        relative = None if weight is None else weight / largest
     given: npt.NDArray[np.number] = rhs.reshape(rows, -1)
     columns = given
     threads = arguments.worker_count(workers)
@@ -264,8 +265,10 @@ def rolling_least_squares(
             )
     residuals = found.residuals
     if is_robust:
-        residuals = residuals + np.asarray(given - columns, dtype=np.float64)[::stride].T
-    rss = found.rss if weight is None else found.rss * largest
+        with np.errstate(invalid="ignore"):  # infinite right-hand sides are no rows
+            residuals = residuals + np.asarray(given - columns, dtype=np.float64)[::stride].T
+    with np.errstate(over="ignore"):
+        rss = found.rss if weight is None else found.rss * largest
 
     def some(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Return what is wanted, windows first."""

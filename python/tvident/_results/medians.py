@@ -81,7 +81,8 @@ def error_of_median(values: Array, errors: Array, in_common: float, window: floa
     windows = np.split(below, np.flatnonzero(np.diff(there // window)) + 1)
     # In order each is the smaller one of its pairs with all that follow.
     variance = sum(float(np.sort(one) @ np.arange(2 * one.size - 1, 0, -2)) - float(one.sum()) ** 2 for one in windows)
-    nearby = np.exp(-0.5 * away**2) / math.sqrt(2 * math.pi)
+    with np.errstate(all="ignore"):  # so far away that nothing is left
+        nearby = np.exp(-0.5 * away**2) / math.sqrt(2 * math.pi)
     if nearby.sum() < _NOWHERE:
         return np.inf
     return math.hypot(math.sqrt(max(variance, 0.0)) / float(np.sum(nearby / own)), shared)

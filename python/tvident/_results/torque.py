@@ -167,6 +167,7 @@ def noise_of_compared(torque: npt.NDArray[np.number], settings: Mapping[str, Any
     return variance * float(phi @ phi)
 
 
+@np.errstate(all="ignore")  # samples that are no numbers for the core may be beyond doubles in sums
 def correlated_with(values: Array, kernels: Array) -> Array:
     """Return the sums of samples around each one, weighted by each kernel; zero where they do not fit. By overlap-save."""
     width = kernels.shape[1]

@@ -303,7 +303,11 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
             "stiffness": stiffness,
             "terms": terms,
             "lag": lag,
-            "quantisation": None if quantisation is None else quantisation * self._axis.angle,
+            "quantisation": (
+                None
+                if quantisation is None
+                else arguments.finite_number("quantisation", quantisation) * self._axis.angle
+            ),
             "period": period,
         }
         self._policy = arguments.one_of("nan_policy", nan_policy, get_args(arguments.RowPolicy))

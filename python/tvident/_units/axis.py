@@ -117,4 +117,5 @@ def scaled(array: npt.NDArray[Any], factor: float) -> npt.NDArray[Any]:
     if array.dtype.kind in "mM":
         raise UnitError("dates and durations know their unit; got time_unit too; leave it out")
     wide = array if array.dtype == np.float64 else array.astype(np.float64)
-    return np.asarray(wide * factor)
+    with np.errstate(all="ignore"):  # what leaves the range of doubles is no sample
+        return np.asarray(wide * factor)

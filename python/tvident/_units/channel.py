@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from reprlib import repr as _shown
 from typing import Any, Self
 
 import numpy as np
@@ -49,7 +50,14 @@ class Channel(np.ndarray[Any, Any]):
 
     def __new__(cls, samples: npt.ArrayLike, unit: str = "") -> Self:
         """Give samples a unit, without a copy."""
-        channel = np.asarray(samples).view(cls)
+        if not isinstance(unit, str):
+            raise TypeError(f"a unit must be a text; got {_shown(unit)}; pass 'rad', 'N m' or another")
+        try:
+            channel = np.asarray(samples).view(cls)
+        except ValueError:
+            raise ValueError(
+                f"samples must be a regular array of numbers; got {_shown(samples)}; give all rows the same length"
+            ) from None
         channel.unit = unit
         return channel
 
@@ -93,10 +101,13 @@ class Channel(np.ndarray[Any, Any]):
         --------
         tvident.identify : converts channels by itself.
         """
+        if not isinstance(unit, str):
+            raise TypeError(f"a unit must be a text; got {_shown(unit)}; pass 'rad', 'N m' or another")
         here, there = unit_of(self.unit), unit_of(unit)
         if here is None or there is None or here.dimension != there.dimension or not here.factor > 0 < there.factor:
             raise UnitError(
-                f"a unit is converted to one of the same quantity; got {self.unit!r} and {unit!r}; multiply by a factor of your own"
+                f"a unit is converted to one of the same quantity; got {_shown(self.unit)} and {_shown(unit)}; multiply by a "
+                "factor of your own"
             )
         return Channel(np.asarray(self) * (here.factor / there.factor), unit)
 
