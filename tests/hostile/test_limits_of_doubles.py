@@ -66,3 +66,10 @@ def test_the_core_of_huber_goes_over_what_is_infinite() -> None:
     rhs[100] = np.inf
     found = tvident.rolling_least_squares(rows, rhs, 40, loss="huber", weights=np.full(300, 1e300))
     assert np.isfinite(found.params).any()
+
+
+def test_advice_knows_parameters_at_every_sample() -> None:
+    """Dry friction is missing, and what explains more beside a stiffness that is an array is compared."""
+    torque = RIG.torque + 0.3 * np.sign(np.gradient(RIG.true_angle))
+    found = tvident.identify(RIG.angle, torque, sample_rate=200, stiffness=RIG.stiffness)
+    assert any("coulomb" in words for words in found.advice)

@@ -68,7 +68,7 @@ class Read(NamedTuple):
 
 
 # What is infinite is missing.
-@np.errstate(invalid="ignore", over="ignore")
+@np.errstate(all="ignore")
 def readings_of(row: npt.NDArray[np.number]) -> Read | None:
     """Return the samples of a record that are readings, and the places in it where they were read; None where it holds none.
 
@@ -118,7 +118,7 @@ def _is_clipped(row: npt.NDArray[np.number], hold: float) -> npt.NDArray[np.bool
     return clipped
 
 
-@np.errstate(invalid="ignore", over="ignore")
+@np.errstate(all="ignore")
 def knots_of(row: npt.NDArray[np.number]) -> Read | None:
     """Return the samples of a record between which it is straight, as readings; None where these keep no beat of whole samples."""
     if row.dtype.kind != "f":

@@ -362,7 +362,7 @@ class Trial:
         found = self._identified(call)
         if call["lag"] == "auto":
             call = call | {"lag": float(f"{found.settings['lag']:.4g}")}
-        is_none = call["stiffness"] != before["stiffness"]
+        is_none = not np.array_equal(call["stiffness"], before["stiffness"])  # which may be arrays without NaN
         kept = {name: call[name] if name == "stiffness" and is_none else kind for name, kind in self.given.items()}
         is_at_hand = self.is_as_asked and not (chosen or is_none)
         free = self.result if is_at_hand else self.identify(**kept, terms=call["terms"], lag=call["lag"], diagnose=True)

@@ -53,7 +53,8 @@ def with_clipped_torque(data: Data, loss: LossAsked, identified: Callable[[Data]
                 open_records.remove(record)
                 continue
             clipped = clip_residuals(recorded[record], predicted)
-            moved = np.abs(clipped.values - torques[record])
+            with np.errstate(invalid="ignore"):  # infinite samples stay as they are
+                moved = np.abs(clipped.values - torques[record])
             torques[record], shares[record] = clipped.values, clipped.share
             if not np.nanmax(moved, initial=0.0) > _SETTLED * clipped.scale:
                 open_records.remove(record)

@@ -166,6 +166,7 @@ def judged(
     return HeldBack(shares[0] if simulated else np.nan, shares[-1], len(parts), steady=steady)
 
 
+@np.errstate(all="ignore")  # of samples beyond doubles nothing is predicted
 def _without_the_worst(
     angle: npt.NDArray[np.number], predicted: npt.NDArray[np.float64], parts: list[tuple[int, int, int]]
 ) -> float:
