@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import pickle
 import threading
 import time
 from collections.abc import Iterator
@@ -381,6 +382,24 @@ def test_workers_can_be_set_in_the_environment(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setenv("TVIDENT_WORKERS", "many")
     with pytest.raises(ValueError, match="TVIDENT_WORKERS must be a whole number above zero; got 'many'"):
         tvident.fit_local_polynomials(np.arange(100.0), 11)
+
+
+@pytest.mark.parametrize("window", [51, "auto"])
+@pytest.mark.parametrize("is_uniform", [True, False])
+def test_a_fit_is_pickled_with_its_errors(window: Any, is_uniform: bool) -> None:
+    """What chose its orders could not be stored, so no fit came back from another process."""
+    y = np.stack([signal(1, 500, 0.01), signal(2, 500, 0.01)])
+    t = np.arange(500) / 300
+    if not is_uniform:
+        t[250:] += 0.5
+    fit = tvident.fit_local_polynomials(y, window, t=t)
+    stored = pickle.loads(pickle.dumps(fit))  # noqa: S301 - what was stored here
+    for name in ("derivatives", "stderr", "sigma", "order", "status", "time", "window_length"):
+        np.testing.assert_array_equal(getattr(stored, name), getattr(fit, name), name)
+    assert stored.settings == fit.settings
+    assert fit.scores(100).shape[1:] == (2,)
+    with pytest.raises(ValueError, match="scores must be asked of a fit that was not stored"):
+        stored.scores(100)
 
 
 def test_status_has_the_flags_of_the_core() -> None:

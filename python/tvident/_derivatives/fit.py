@@ -107,7 +107,7 @@ class LocalPolynomialFit(Tabular):
         self._samples = samples
         self._axis = axis % samples.ndim
         self._sampled = sampled
-        self._found = found
+        self._found: Found | None = found
         self.derivatives: npt.NDArray[np.float64] = self._in_place(found.derivatives)
         self.order: npt.NDArray[np.uint8] = self._in_place(found.order)
         self.status: npt.NDArray[np.uint16] = self._in_place(found.status)
@@ -163,6 +163,7 @@ class LocalPolynomialFit(Tabular):
         >>> np.round(fit.stderr[0, 500] * np.sqrt(101) / fit.sigma[500], 6)
         np.float64(1.0)
         """
+        assert self._found is not None  # noqa: S101 - what is stored has its errors
         return self._in_place(self._found.errors())
 
     def scores(self, i: int) -> npt.NDArray[np.float64]:
@@ -185,6 +186,8 @@ class LocalPolynomialFit(Tabular):
             If there is no such sample.
         TypeError
             If `i` is not a whole number.
+        ValueError
+            If the fit was stored: pickling keeps no plan of its windows.
 
         See Also
         --------
@@ -213,15 +216,22 @@ class LocalPolynomialFit(Tabular):
         place = arguments.whole_number("i", i)
         if not -samples <= place < samples:
             raise IndexError(f"i must be a sample number below {samples}; got {place}; count from 0")
+        found = self._found
+        if found is None:
+            raise ValueError(
+                "scores must be asked of a fit that was not stored; got one that was pickled; fit the samples again"
+            )
         leading = self._samples.shape[:-1]
-        columns = [
-            self._found.plan_of(index).scores(self._samples[index], place % samples) for index in np.ndindex(leading)
-        ]
+        columns = [found.plan_of(index).scores(self._samples[index], place % samples) for index in np.ndindex(leading)]
         # Windows of different lengths may have different numbers of candidates.
         scores = np.full((max(map(len, columns), default=0), len(columns)), np.inf)
         for column, values in enumerate(columns):
             scores[: len(values), column] = values
         return scores.reshape(-1, *leading)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Errors are computed when they are asked for, by what cannot be stored.
+        return self.__dict__ | {"stderr": self.stderr, "_found": None}
 
     def _table(self) -> Table:
         sampled = self._sampled

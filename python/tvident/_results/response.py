@@ -140,6 +140,7 @@ class Model:
             )
         return found.angle.reshape(shape), found.velocity.reshape(shape)
 
+    @np.errstate(all="ignore")
     def _around_itself(self, torque: Numbers, **how: Any) -> tuple[Array, Array]:
         """Simulate a system with terms of the user's own: they are linearised around the last response until it stays (Newton)."""
         shape, t = torque.shape, self.start + np.arange(torque.shape[-1]) * self.period
