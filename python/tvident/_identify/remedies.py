@@ -270,10 +270,7 @@ class Trial:
         return tried
 
     def _leaves_nothing(self, found: Identification) -> bool:
-        """Return whether nothing contradicts the equation of a result, suspects included, and it explains nearly all that was left.
-
-        Whatever else is tried can explain hardly more, and what a channel is suspected of no equation mends.
-        """
+        """Return whether nothing that an equation mends contradicts a result, and it explains nearly all that was left."""
         contradicted = found.record_status & _CONTRADICTED & ~Status.CHANNEL_SUSPECTED
         return not contradicted and self._left_of(found).ratio <= _NEARLY_ALL
 
