@@ -52,8 +52,9 @@ TIMED := tests/house/test_parallel.py tests/house/test_times.py
 test-python: $(BUILT)  ## tests of the Python package
 	# What promises a time is alone on the machine.
 	$(BIN)/python -m pytest --quiet $(TIMED)
-	# Two processes on neighbouring tests: what tests of one file share is made once. Whoever is done first takes over from the other.
-	$(BIN)/python -m pytest --quiet --numprocesses=2 --dist=worksteal $(addprefix --ignore=,$(TIMED))
+	# Three processes on neighbouring tests: what tests of one file share is made once, and two processors have work while one of them
+	# waits for a cluster, a browser or a stream. Whoever is done first takes over from the others.
+	$(BIN)/python -m pytest --quiet --numprocesses=3 --dist=worksteal $(addprefix --ignore=,$(TIMED))
 
 .PHONY: test-long
 test-long: $(BUILT)  ## the longest tests: more seeds and cases of what `make test` tests by some

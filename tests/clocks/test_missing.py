@@ -7,6 +7,7 @@ import numpy.typing as npt
 import pytest
 
 import tvident
+from tvident._arguments import check_no_lost_samples
 from tvident._clocks import bridged
 from tvident._clocks.missing import Bridge, bridge_of
 
@@ -87,3 +88,12 @@ def test_digits_of_an_even_clock_are_no_lost_samples(rate: float, noise: float) 
     angle = rig.angle + noise * np.random.default_rng(0).standard_normal(rig.angle.size)
     found = tvident.identify(angle, rig.torque, t=np.round(rig.time, 3), stiffness="constant")
     assert f"at {rate:g} Hz" in found.summary()
+
+
+def test_fast_tones_in_times_of_few_digits_are_of_an_even_clock() -> None:
+    """Five steps of 999 Hz are 2 ms in three digits: of a tenth of such records both tones stepped there as if samples were lost."""
+    for seed in range(100):
+        generator = np.random.default_rng(seed)
+        time = generator.random() + np.arange(4995) / 999
+        angle = sum(np.sin(2 * np.pi * one * time + 6 * generator.random()) for one in (83, 150))
+        check_no_lost_samples(np.round(time, 3), angle + 1e-4 * generator.standard_normal(time.size))

@@ -53,7 +53,7 @@ def check_no_lost_samples(t: npt.ArrayLike | None, channel: npt.NDArray[np.numbe
     is_whole = np.abs(steps - counts * usual) <= max(_EXACT * usual, 4 * float(np.spacing(np.abs(times).max())))
     if not is_whole.all() or counts.min() < 1 or counts.max() == 1:
         return
-    if any(_tells_lost(row, counts) for row in channel.reshape(-1, channel.shape[-1])):
+    if _tell_lost(channel.reshape(-1, channel.shape[-1]), counts):
         longest = int(counts.argmax()) + 1
         raise NotUniformError(
             f"t must be uniform; samples are lost before t[{longest}] = {times[longest]:g}; leave them missing (NaN) on a uniform grid",
@@ -61,28 +61,52 @@ def check_no_lost_samples(t: npt.ArrayLike | None, channel: npt.NDArray[np.numbe
         )
 
 
-def _tells_lost(values: npt.NDArray[np.number], counts: Numbers) -> bool:
-    """Return whether a channel moves on over longer steps as over so many usual ones."""
+def _tell_lost(channels: npt.NDArray[np.number], counts: Numbers) -> bool:
+    """Return whether channels move on over longer steps as over so many usual ones, and not so where no step is longer."""
     longer = np.flatnonzero(counts > 1)
     cumulative = np.concatenate([[0], np.cumsum(counts > 1)])
+
+    def beside(places: npt.NDArray[np.intp], side: int, many: int) -> npt.NDArray[np.intp]:
+        """Return places among whose samples so many steps are longer."""
+        inside = places[(places >= side - 1) & (places + side < channels.shape[-1])]
+        found: npt.NDArray[np.intp] = inside[cumulative[inside + side] - cumulative[inside - side + 1] == many]
+        return found
+
     for side in _SIDES:
-        inside = longer[(longer >= side - 1) & (longer + side < values.size)]
-        # No other longer step among these samples.
-        alone = inside[cumulative[inside + side] - cumulative[inside - side + 1] == 1]
+        alone = beside(longer, side, 1)
         if 2 * alone.size >= longer.size:
             break
     if not alone.size:
         return False
     alone = alone[:: -(-alone.size // _MOST_PLACES)]
-    around = values[alone[:, None] + np.arange(1 - side, side + 1)].astype(np.float64)
-    is_there = np.isfinite(around).all(axis=1)
-    around, lost = around[is_there], counts[alone][is_there] - 1
-    # A curve, and a step in the middle: what it steps by is what was moved while samples were lost.
+    for usual_side in (side, min(_SIDES)):
+        usual = beside(np.arange(channels.shape[-1]), usual_side, 0)
+        if usual.size:
+            break
+    if not usual.size:
+        return False
+    usual = usual[:: -(-usual.size // _MOST_PLACES)]
+    lost = counts[alone] - 1
+    left, uneven = [], []
+    for values in channels:
+        stepped, slope = _steps(values, alone, side)
+        moved = slope * lost
+        stepped = np.clip(stepped, -_LARGEST * np.abs(moved), _LARGEST * np.abs(moved))
+        beside_it, usual_slope = _steps(values, usual, usual_side)
+        square, usual_square = float(np.nansum(stepped**2)), float(np.nansum(usual_slope**2))
+        if square > 0 and usual_square > 0:
+            left.append(float(np.nansum((stepped - moved) ** 2)) / square)
+            uneven.append(float(np.nansum(beside_it**2)) / usual_square)
+    # Motion that is hardly sampled, such as a fast tone, steps anywhere, and may so at every place alike.
+    return bool(left) and bool(max(np.mean(left), np.mean(uneven)) < _CLEARLY)
+
+
+def _steps(values: npt.NDArray[np.number], places: npt.NDArray[np.intp], side: int) -> tuple[Numbers, Numbers]:
+    """Return by how much a channel steps at some places beside a curve through samples on either side, and the slope of that there."""
     number = np.arange(1 - side, side + 1) - 0.5
     rows = np.stack([np.ones_like(number), number, number > 0], axis=1).astype(np.float64)
     if side > min(_SIDES):
         rows = np.column_stack([rows, number**2, number**3])
-    found = np.linalg.lstsq(rows, around.T, rcond=None)[0]
-    moved = found[1] * lost
-    stepped = np.clip(found[2], -_LARGEST * np.abs(moved), _LARGEST * np.abs(moved))
-    return float(np.sum((stepped - moved) ** 2)) < _CLEARLY * float(np.sum(stepped**2))
+    around = values[places[:, None] + np.arange(1 - side, side + 1)].astype(np.float64)
+    found = np.linalg.pinv(rows) @ around.T
+    return found[2], found[1]

@@ -11,6 +11,9 @@ from tvident._formats.told import cut
 _UNITS = ("unit_string", "ni_unitdescription", "unit", "units", "y_unit_label", "unit_description")
 """Properties that hold a unit, in small letters."""
 
+_UNSET = "1904-01-02"
+"""A start before it was not set."""
+
 _SAME_START = 1e-3
 """Parts of a sample period that two starts may differ by and still be one."""
 
@@ -56,7 +59,12 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
 
 
 def _has_start(channel: Any) -> bool:
-    return bool(channel.properties.get("wf_increment")) and "wf_start_time" in channel.properties
+    import numpy as np  # noqa: PLC0415 - within the limits
+
+    start = channel.properties.get("wf_start_time")
+    # Text is no time, and the first instant of 1904 stands for none.
+    is_set = isinstance(start, np.datetime64) and bool(start >= np.datetime64(_UNSET))
+    return is_set and bool(channel.properties.get("wf_increment"))
 
 
 def _unit(properties: Mapping[str, Any]) -> str:

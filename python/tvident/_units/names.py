@@ -18,19 +18,22 @@ _PATHS = ("s", "h")
 _LONG = (
     "deg|degrees?|rad|radians?|mrad|urad|Nm|Nmm|Ncm|mNm|cNm|kNm|N[ _·*.-]mm?|kN|mN|lbf|(?:in|ft)[ _-]?lbf?|lbf?[ _-]?(?:in|ft)"
     "|ms|msecs?|milliseconds?|us|usecs?|microseconds?|ns|nsecs?|nanoseconds?|secs?|seconds?|mm|um|µm|rpm|°"
-    "|Deg|Degrees?|DEG|DEGREES?|RAD|RADIANS?|MRAD|NMM|KN|LBF|MM|RPM|MSECS?|MILLISECONDS?|SECS?|SECONDS?"
+    "|Deg|Degrees?|DEG|DEGREES?|RAD|RADIANS?|MRAD|NMM|LBF|MM|RPM|MSECS?|MILLISECONDS?|SECS?|SECONDS?"
 )
 _BEHIND_A_LINE = re.compile(rf"(.+?)(?:_|\.\.+|\s+-\s+|\s+)({_LONG}|(?<=[_.])N(?=[_.]))[_.]?", re.DOTALL)
 """Units that are no name of anything else, behind a line or a blank; MATLAB and R write a line or a point for every bracket."""
-_AMID_LINES = re.compile(r"(.+?)([_ ])(deg|degrees|DEG|rad|mrad|Nmm?|mNm|kNm|kN)[_ ](.+)", re.DOTALL)
+_AMID_LINES = re.compile(
+    r"(.+?)([_ ])(deg|degrees|DEG|rad|mrad|Nmm?|mNm|kNm|kN)[_ ](?!(?i:per|s|sec)(?:[\W_]|$))(.+)", re.DOTALL
+)
 _ALONE = re.compile(
     "deg|degrees?|Nmm?|mNm|kNm|kN|mm|rpm|m(?:illi)?secs?|u(?:sec)s?|micro(?:secs?|seconds?)|milliseconds?|secs?|seconds?|ms|millis|micros",
     re.IGNORECASE,
 )
 """What is a channel's whole name where a program writes units for names."""
 _OF_TIMES = re.compile(
-    r"(.*(?:time|zeit|stamp|elapsed).*?)(?:(?:[_\s]+|\.\.+)(s|[mun]s|[mun]?secs?|millis|micros|nanos)|(?<=[a-z])([MUN][sS]|Millis|Micros|Nanos))[_.]*",
-    re.IGNORECASE | re.DOTALL,
+    r"(.*(?i:time|zeit|stamp|elapsed).*?)"
+    r"(?:(?:[_\s]+|\.\.+)((?i:s|[mun]s|[mun]?secs?|millis|micros|nanos))|(?<=[a-z])([MUN][sS]|Millis|Micros|Nanos))[_.]*",
+    re.DOTALL,
 )
 _TIMES = {"millis": "ms", "micros": "us", "nanos": "ns"}
 """What Arduino calls its times."""
