@@ -52,9 +52,9 @@ def test_nothing_is_said_of_angles_where_there_are_none(form: str, lag: int, tmp
     sliding = on_rails(RIG.angle, np.roll(RIG.torque, lag), **FORMS[form])
     words = re.sub(r"\btorque_\w+|-torque\b", "", sliding.summary() + sliding._repr_html_())
     assert not re.search(r"\b(angle|torque)s?\b", words)
-    assert "of the force" in sliding.summary()
+    assert "the force" in sliding.summary()
     assert "of the position simulated" in sliding.summary()
-    assert "of the torque" in turning.summary()
+    assert "the torque" in turning.summary()
     # The same is said: one equation is the other in other units.
     assert len(sliding.reasons) == len(turning.reasons)
     sliding.report(tmp_path / "page.html")
