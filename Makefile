@@ -36,14 +36,20 @@ test:  ## every test but the longest; the last line says which tests had no reco
 .PHONY: test-rust
 test-rust: test-units test-crate  ## tests of the core
 
+# Tests inside the core have it compiled for themselves: not optimised, that takes a fifth of the time, and they are short. All other
+# tests share one core, as optimised as what is shipped, which is compiled while those run. Cargo has a job server of its own.
+TEST_UNITS := MAKEFLAGS= cargo test --package tvident --lib --profile checked --quiet --config profile.checked.package.tvident.opt-level=0
+
+.PHONY: build-units
+build-units:
+	$(TEST_UNITS) --no-run
+
 .PHONY: test-units
-test-units:
-	# Tests inside the core have it compiled for themselves: not optimised, that takes a fifth of the time, and they are short. All other
-	# tests share one core, as optimised as what is shipped. Cargo has a job server of its own.
-	MAKEFLAGS= cargo test --package tvident --lib --profile checked --quiet --config profile.checked.package.tvident.opt-level=0
+test-units: build-units
+	$(TEST_UNITS)
 
 .PHONY: test-crate
-test-crate:
+test-crate: build-units
 	MAKEFLAGS= cargo test --workspace --test '*' --profile checked --quiet
 	MAKEFLAGS= cargo test --workspace --doc --profile checked --quiet
 
