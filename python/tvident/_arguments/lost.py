@@ -29,7 +29,8 @@ def check_no_lost_samples(t: npt.ArrayLike | None, channel: npt.NDArray[np.numbe
     """Refuse times as uniform that are so but for their digits, where a channel tells that samples are lost.
 
     Steps of 1 ms with one of 2 ms in 500 are those of 998 Hz in three digits, or of 1000 Hz with a sample lost in 500. In the first case
-    a channel goes on evenly over the longer steps, in the second it moves twice as far. Where noise hides that it goes on evenly.
+    a channel goes on evenly over the longer steps, in the second it moves twice as far. Where noise or fast motion hides which of both it
+    is, times count as uniform.
 
     Parameters
     ----------

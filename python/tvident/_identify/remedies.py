@@ -131,7 +131,7 @@ class Trial:
         # What explains nothing with parameters that change is not explained by one term more either.
         is_changing = "windowed" in self.result.settings["kinds"].values() and not self._explains_nothing
         # Where a parameter changes constants explain too little to tell what is missing: they take what lets them follow the change.
-        # What constants explain down to the noise needs nothing that changes.
+        # What constants explain down to the noise needs nothing that changes, and an equation that leaves nothing no other.
         is_settled = of_constants is not None and of_constants.is_settled
         beside = steady = None
         if is_changing and not is_settled:

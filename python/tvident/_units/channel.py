@@ -16,6 +16,12 @@ from tvident._units.quantities import UnitError
 _JOINED = (np.concatenate, np.stack, np.vstack, np.hstack, np.column_stack)
 
 
+def _check_text(unit: object) -> None:
+    """Raise TypeError if a unit is no text."""
+    if not isinstance(unit, str):
+        raise TypeError(f"a unit must be a text; got {_shown(unit)}; pass 'rad', 'N m' or another")
+
+
 class Channel(np.ndarray[Any, Any]):
     """Samples with their unit, as :func:`tvident.read_recording` gives them: an array in every other way.
 
@@ -50,8 +56,7 @@ class Channel(np.ndarray[Any, Any]):
 
     def __new__(cls, samples: npt.ArrayLike, unit: str = "") -> Self:
         """Give samples a unit, without a copy."""
-        if not isinstance(unit, str):
-            raise TypeError(f"a unit must be a text; got {_shown(unit)}; pass 'rad', 'N m' or another")
+        _check_text(unit)
         try:
             channel = np.asarray(samples).view(cls)
         except ValueError:
@@ -101,8 +106,7 @@ class Channel(np.ndarray[Any, Any]):
         --------
         tvident.identify : converts channels by itself.
         """
-        if not isinstance(unit, str):
-            raise TypeError(f"a unit must be a text; got {_shown(unit)}; pass 'rad', 'N m' or another")
+        _check_text(unit)
         here, there = unit_of(self.unit), unit_of(unit)
         if here is None or there is None or here.dimension != there.dimension or not here.factor > 0 < there.factor:
             raise UnitError(
