@@ -85,7 +85,7 @@ fn noise_of(
     let quantisation = quantisation.unwrap_or_else(|| quantisation_step(record));
     let halves = HALVES.iter().filter(|&half| 2 * half < samples);
     let variance = halves.map(|&half| variance(record, half, weights, instructions)).fold(f64::NAN, f64::min);
-    let least = least(quantisation, weights).max((f64::EPSILON * largest(record)).powi(2));
+    let least = rounding_variance(quantisation, weights).max((f64::EPSILON * largest(record)).powi(2));
     let sigma = if variance.is_nan() { f64::NAN } else { variance.max(least).sqrt() };
     Ok(Noise { sigma, quantisation })
 }
@@ -108,12 +108,12 @@ pub(crate) fn weighted_variance(
     if found.sigma.is_nan() {
         return 0.0;
     }
-    let least = least(found.quantisation, weights);
+    let least = rounding_variance(found.quantisation, weights);
     (found.sigma * found.sigma).min(quietest_band(record, weights)).max(least)
 }
 
 /// The variance that rounding to a step leaves; it does not know of weights, so it is that of a sample of mean weight.
-fn least(quantisation: f64, weights: Option<&[f64]>) -> f64 {
+pub(crate) fn rounding_variance(quantisation: f64, weights: Option<&[f64]>) -> f64 {
     let mean = weights.map_or(1.0, |weights| {
         let used = weights.iter().filter(|weight| **weight > 0.0);
         used.clone().sum::<f64>() / used.count().max(1) as f64
@@ -135,7 +135,7 @@ pub fn variance_after(
         return 0.0;
     }
     let quantisation = quantisation.unwrap_or(0.0);
-    passed.gain * variance.max(quantisation * quantisation / 12.0).max((f64::EPSILON * largest(record)).powi(2))
+    passed.gain * variance.max(rounding_variance(quantisation, None)).max((f64::EPSILON * largest(record)).powi(2))
 }
 
 /// The noise of a channel that was resampled: that of [`variance_after`], and its quantisation where that is not given.

@@ -21,7 +21,7 @@ use crate::identify::weak::pulses::{add_pulses, allow_hidden, are_the_same, with
 use crate::identify::weak::session::{Session, always_constant};
 use crate::identify::weak::torque_jumps::without_jumps;
 use crate::noise::breaks::search::{Broken, breaks};
-use crate::noise::channel::{variance_after, weighted_variance};
+use crate::noise::channel::{rounding_variance, variance_after, weighted_variance};
 use crate::noise::defects::{Defect, Within, defects};
 use crate::noise::passed::PassedNoise;
 use crate::noise::quantisation::quantisation_step;
@@ -306,7 +306,7 @@ fn settled(
     mut stages: Stages<'_, '_>,
 ) -> Result<WeakIdentified, Error> {
     let step = options.quantisation.unwrap_or_else(|| quantisation_step(record.angle));
-    let is_rounding = step > 0.0 && channel_noise[0] <= HARDLY_MORE * step * step / 12.0;
+    let is_rounding = step > 0.0 && channel_noise[0] <= HARDLY_MORE * rounding_variance(step, record.weights);
     // What looks like a pulse where samples are missing may be a loss that was not detected.
     let (mut pulses, mut calm, mut round) = (Vec::new(), Vec::new(), if whole { 0 } else { PULSE_ROUNDS });
     loop {
