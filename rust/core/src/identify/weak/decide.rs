@@ -57,6 +57,9 @@ impl Session<'_, '_, '_> {
         let (mut jumps, mut whole, mut round) = (Vec::new(), None, 0);
         loop {
             let mut decided = self.decide_kinds(chosen, model, jumps.iter().any(|jump: &Jump| jump.of_constants))?;
+            if self.varies_too_much(&decided) {
+                return Ok(decided);
+            }
             let of_constants =
                 if round == 0 { self.jumps_of_constants(&chosen.weak, &decided, model)? } else { Vec::new() };
             let found = if !of_constants.is_empty() {
@@ -146,6 +149,10 @@ impl Session<'_, '_, '_> {
             }
             let worst = self.test(rows, &mut decided)?;
             let Some(worst) = changing.next().or(worst) else {
+                if self.most_slow == Some(decided.slow.len()) && decided.error >= BADLY {
+                    // Nothing more may vary that would predict well.
+                    break;
+                }
                 is_free = self.set_growing_free(rows, &model, &mut decided)?;
                 if is_free {
                     continue;
@@ -167,10 +174,19 @@ impl Session<'_, '_, '_> {
                 }
             } else {
                 decided.slow.push(worst);
+                if self.varies_too_much(&decided) {
+                    // To find how it varies takes longest of all.
+                    return Ok(decided);
+                }
             }
         }
         self.set_others_free(rows, &model, &mut decided)?;
         Ok(decided)
+    }
+
+    /// Whether more varies than may.
+    pub(crate) fn varies_too_much(&self, decided: &Decided) -> bool {
+        self.most_slow.is_some_and(|most| decided.slow.len() > most)
     }
 
     /// Tests every constant. Returns the one that differs most between the parts of the record, if it may be set free.

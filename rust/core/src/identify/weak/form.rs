@@ -324,6 +324,7 @@ fn settled(
             scan: Scan::default(),
             free_offset: FreeOffset::default(),
             windowed_offset: None,
+            most_slow: None,
             followed: None,
             best_before: None,
             is_rough: false,

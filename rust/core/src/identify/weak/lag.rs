@@ -82,7 +82,7 @@ impl Session<'_, '_, '_> {
                 chosen = self.choose(model)?;
             }
             let mut decided = self.decide(&mut chosen, model)?;
-            if self.options.lag.is_some() {
+            if self.options.lag.is_some() || self.varies_too_much(&decided) {
                 return Ok((chosen, decided, None));
             }
             if choice == 1 && !decided.slow.is_empty() {

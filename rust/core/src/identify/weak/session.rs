@@ -37,6 +37,8 @@ pub(crate) struct Session<'a, 'b, 'c> {
     pub(crate) free_offset: FreeOffset,
     /// The offset that the record was to decide upon and that is free in every window.
     pub(crate) windowed_offset: Option<usize>,
+    /// Coefficients that may vary slowly at most, where an equation is of no use if more do.
+    pub(crate) most_slow: Option<usize>,
     /// What was found to change beside constants alone, and is followed in windows.
     pub(crate) followed: Option<usize>,
     /// Samples of the windows that were best a step before, where little changed since: the best ones are near.

@@ -39,15 +39,16 @@ impl Session<'_, '_, '_> {
         }
         let before = (self.scan.clone(), self.record.lag, self.noise);
         self.windowed_offset = Some(offset);
+        // What else is missing, such as a lag, is followed in part by anything that is free; beside a drift that is gone nothing more varies.
+        self.most_slow = (!differs).then_some(constant.1.slow.len());
         let free = self.model();
         let chosen = self.choose(&free)?;
         let settled = self.decide_and_choose_again(chosen, &free)?;
-        self.windowed_offset = None;
         let error = settled.1.error;
-        // Errors are compared on the same rows: those that were chosen beside a constant offset are long enough to hide what drifts. What else
-        // is missing, such as a lag, is followed in part by anything that is free; beside a drift that is gone nothing more varies.
-        let explains = error < BADLY && settled.1.slow.len() <= constant.1.slow.len();
+        let explains = error < BADLY && !self.varies_too_much(&settled.1);
         let is_possible = settled.1.fit.is_some() && (differs || explains);
+        (self.windowed_offset, self.most_slow) = (None, None);
+        // Errors are compared on the same rows: those that were chosen beside a constant offset are long enough to hide what drifts.
         let least = if differs { 1.0 } else { BETTER };
         if is_possible && error < least * self.error_beside_constant(&settled.0, model, &constant)? {
             self.windowed_offset = Some(offset);
