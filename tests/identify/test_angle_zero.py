@@ -76,6 +76,20 @@ def test_few_rows_of_many_lead_to_the_same_zero(seed: int) -> None:
     assert result.record_status == 0
 
 
+@pytest.mark.first(1)
+@pytest.mark.parametrize(("seed", "damping"), [(130, 0.00825), (204, 0.025)])
+def test_windows_that_are_chosen_again_leave_a_part_of_an_error_and_do_not_end_the_search(
+    seed: int, damping: float
+) -> None:
+    record = tvident.simulate_torsional_rig(20.0, seed=seed, pattern="slider", angle_noise=1e-3, damping=damping)
+    zero = 3.0 * record.angle.std()
+    result = tvident.identify(record.angle + zero, record.torque, sample_rate=1000)
+    value, error = result.constants["angle_zero"]
+    assert abs(value - zero) < ERRORS * error
+    assert abs(result.inertia[0] / record.inertia[0] - 1) < WITHIN_INERTIA
+    assert result.record_status == 0
+
+
 def test_the_size_of_the_zero_changes_nothing_else() -> None:
     small, large = plainly(0, 0.1), plainly(0, 3.0)
     # Both are found by steps that end at a fiftieth of an error.

@@ -20,8 +20,10 @@ use crate::regression::model::Model;
 const CHOICES: usize = 3;
 /// Steps towards it with one choice.
 const STEPS: usize = 8;
-/// A step that is larger than this part of the last one leads nowhere: the equations do not hold.
+/// A step that is larger than this part of the last one leads nowhere: the equations do not hold, unless it is within the error. Windows are
+/// chosen again after each step, and what is left differs by chance between two that predict equally well.
 const SLOWEST: f64 = 0.7;
+const WITHIN_ERROR: f64 = 1.0;
 /// A step so small, in standard errors, is the last with one choice, and a choice that moves the angle by no more is the last.
 const SETTLED: f64 = 0.02;
 const CHOSEN: f64 = 0.3;
@@ -176,7 +178,7 @@ impl Session<'_, '_, '_> {
                 return Ok(true);
             }
             if left.abs() > SLOWEST * before {
-                return Ok(false);
+                return Ok(left.abs() <= WITHIN_ERROR * error);
             }
             before = left.abs();
             self.move_zero(chosen, left);
