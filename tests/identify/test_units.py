@@ -144,6 +144,24 @@ def test_stamps_and_days_are_asked_about_with_the_unit_that_cures(
         assert cured.constants["inertia"][0] == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("step", "words", "units"),
+    [
+        (1e9 / 51_200, "microseconds (51.2 Hz) or nanoseconds (51.2 kHz)", ("us", "ns")),
+        (1e6 / 51_200, "milliseconds (51.2 Hz) or microseconds (51.2 kHz)", ("ms", "us")),
+        (1e9 / 1000, "nanoseconds", ("ns",)),
+        (60.0, "microseconds", ("us",)),
+        (1e11, "nanoseconds", ("ns",)),
+    ],
+)
+def test_both_units_of_time_are_named_where_both_are_possible(step: float, words: str, units: tuple[str, ...]) -> None:
+    """Nanoseconds at 51.2 kHz heard "microseconds?" alone."""
+    result = tvident.identify(RIG.angle, RIG.torque, t=step * np.arange(RIG.angle.size), stiffness="constant")
+    asked = next(one for one in result.advice if "is the time in" in one)
+    given = " or ".join(f"time_unit='{unit}'" for unit in units)
+    assert asked.endswith(f"is the time in {words}? Then give {given} with t= or delta=")
+
+
 def test_a_damping_that_feeds_energy_and_a_spring_that_pushes_are_asked_about() -> None:
     generator = np.random.default_rng(0)
     t = np.arange(8000) / 1000

@@ -20,8 +20,11 @@ _SLOW = 0.09
 """A sample period in seconds from which on it may be in milliseconds: a step of 0.1 ms, at 10 kHz, looks like 0.1 s, and hardly a vibration
 is sampled so slowly."""
 
-_LONGEST_STEP = 50.0
-"""Of times in milliseconds, 20 Hz; a longer step is in microseconds, up to a thousand times as long, or in nanoseconds."""
+_UNITS = ((1e-3, "milliseconds", "ms"), (1e-6, "microseconds", "us"), (1e-9, "nanoseconds", "ns"))
+"""In which recorders write times, in seconds."""
+
+_SLOWEST, _FASTEST = 20.0, 110e3
+"""Rates in Hz between which a unit is possible: motion is hardly sampled more slowly, and vibration at up to 102.4 kHz."""
 
 _DAYS = 2e-7
 """A sample period in seconds, 5 MHz, up to which it may be in days, as spreadsheets and datenum count: 60 Hz or more."""
@@ -83,22 +86,24 @@ class Plausible:
         if "time" not in self.axis.assumed:
             return []
         if self.period <= _DAYS:
-            word, unit = "days", "days"
-        elif self.period >= _SLOW:
-            word, unit = next(
-                (word, unit)
-                for most, word, unit in (
-                    (_LONGEST_STEP, "milliseconds", "ms"),
-                    (1000 * _LONGEST_STEP, "microseconds", "us"),
-                    (math.inf, "nanoseconds", "ns"),
-                )
-                if self.period <= most
-            )
-        else:
+            return [
+                f"there is one sample in {self.period:.4g} s: is the time in days? Then give time_unit='days' with t= or delta="
+            ]
+        if self.period < _SLOW:
             return []
-        return [
-            f"there is one sample in {self.period:.4g} s: is the time in {word}? Then give time_unit='{unit}' with t= or delta="
+        rates = {(word, unit): 1 / (self.period * scale) for scale, word, unit in _UNITS}
+        possible = [one for one, rate in rates.items() if _SLOWEST <= rate <= _FASTEST] or [
+            # Slower than any, or faster: the unit that comes nearest.
+            min(rates, key=lambda one: abs(math.log(rates[one] / _SLOWEST)))
         ]
+        if len(possible) == 1:
+            [(word, unit)] = possible
+            question = f"{word}? Then give time_unit='{unit}' with t= or delta="
+        else:
+            words = " or ".join(f"{one[0]} ({_in_words(rates[one])})" for one in possible)
+            units = " or ".join(f"time_unit='{unit}'" for _, unit in possible)
+            question = f"{words}? Then give {units} with t= or delta="
+        return [f"there is one sample in {self.period:.4g} s: is the time in {question}"]
 
     def _signs(self, found: Estimates, record: int) -> list[str]:
         sign = {name: self._sign(found, name, record) for name in ("inertia", "damping", "stiffness")}
@@ -145,3 +150,8 @@ class Plausible:
             if np.count_nonzero(certain & (sign * values > 0)) >= _MOSTLY * np.count_nonzero(known):
                 return sign
         return 0
+
+
+def _in_words(rate: float) -> str:
+    """Return a sample rate with its unit."""
+    return f"{rate / 1000:.3g} kHz" if rate >= 1000 else f"{rate:.3g} Hz"  # noqa: PLR2004 - kilo
