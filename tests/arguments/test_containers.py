@@ -134,7 +134,10 @@ def test_records_below_each_other_are_no_record() -> None:
     levels = {"trial": range(2), "time": np.arange(1000) / 1000}
     index = pd.MultiIndex.from_product(list(levels.values()), names=list(levels))
     angle, torque = (pd.Series(one, index=index) for one in (rig.angle, rig.torque))
-    with pytest.raises(ValueError, match=r"begins again at sample 1000; pass angle.unstack\(0\), or one record"):
+    with pytest.raises(
+        ValueError,
+        match=r"begins again at sample 1000; if these are records one below the other, pass angle.unstack\(0\), or one of",
+    ):
         tvident.identify(angle, torque, sample_rate=1000)
     swapped = angle.swaplevel().sort_index()
     with pytest.raises(ValueError, match=r"pass y.unstack\(1\)"):
@@ -143,3 +146,16 @@ def test_records_below_each_other_are_no_record() -> None:
     assert result.inertia.shape == (2, 1000)
     one = tvident.identify(angle.loc[[0]], torque.loc[[0]], sample_rate=1000, stiffness="constant")
     np.testing.assert_array_equal(one.inertia, result.inertia[0])
+
+
+def test_an_index_of_two_levels_may_belong_to_one_record() -> None:
+    """The cure made ten records of one whose samples were called by second and millisecond."""
+    levels = pd.MultiIndex.from_arrays([np.arange(N) // 100, np.arange(N) % 100], names=["second", "millisecond"])
+    angle, torque = pd.Series(ANGLE, levels), pd.Series(TORQUE, levels)
+    with pytest.raises(ValueError, match="begins again at sample 100;") as said:
+        identified(angle, torque)
+    assert "angle.xs(0, level=0)" in str(said.value)
+    assert str(said.value).endswith(
+        "if all is one record, as where levels are seconds and milliseconds, pass angle.to_numpy()"
+    )
+    assert_array_equal(identified(angle.to_numpy(), torque.to_numpy()).stiffness, PLAIN.stiffness)

@@ -102,9 +102,12 @@ def _check_one_record(name: str, values: Any) -> None:
     if not began.size:
         return
     level = min(range(index.nlevels), key=lambda one: index.get_level_values(one).nunique())
+    first = index.get_level_values(level)[0]
+    key = first.item() if isinstance(first, np.generic) else first
     raise ValueError(
         f"{name} must be one record, or a table with a column for each; the last level of its index begins again at sample "
-        f"{began[0] + 1}; pass {name}.unstack({level}), or one record of it: {name}.xs({index.get_level_values(level)[0]!r}, level={level})"
+        f"{began[0] + 1}; if these are records one below the other, pass {name}.unstack({level}), or one of them: "
+        f"{name}.xs({key!r}, level={level}); if all is one record, as where levels are seconds and milliseconds, pass {name}.to_numpy()"
     )
 
 
