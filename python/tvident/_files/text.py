@@ -31,6 +31,10 @@ _MOST_ABOVE, _TALLEST = 100, 8
 _HOLDS_A_NUMBER = re.compile(r"(?:^|[,;\t|])\s*[+-]?[.,]?\d[\d.,]*\s*(?:[,;\t|]|$)", re.MULTILINE)
 """A row that does is none of names."""
 
+_OPENING = re.compile(r'(?:^|(?<=[\s,;|]))"(?![\s,;|]|$)')
+_QUOTES = re.compile('"+')
+"""What begins a cell in quotes; within it quotes are doubled."""
+
 _COMPRESSED = {
     b"\x1f\x8b": "gzip",
     b"PK\x03\x04": "zip",
@@ -173,15 +177,29 @@ def _with_whole_names(lines: list[str]) -> list[str]:
     start = 0
     while start < min(len(lines), _MOST_ABOVE):
         end = start
-        while lines[start].count('"') % 2 and end < min(start + _TALLEST, len(lines) - 1):
+        last = min(start + _TALLEST, len(lines) - 1)
+        row = lines[start]
+        while _is_open(row) and end < last:
             end += 1
-            if lines[end].count('"') % 2:
-                row = lines[start : end + 1]
-                if not _HOLDS_A_NUMBER.search("\n".join(row)):
-                    lines[start : end + 1] = [""] * (end - start) + [" ".join(one.strip() for one in row)]
-                break
-        start = end + 1
+            row += "\n" + lines[end]
+        if end > start and not _is_open(row) and not _HOLDS_A_NUMBER.search(row):
+            joined = " ".join(one.strip() for one in lines[start : end + 1])
+            lines[start : end + 1] = [""] * (end - start) + [joined]
+            start = end
+        start += 1
     return lines
+
+
+def _is_open(row: str) -> bool:
+    """Return whether a cell begins with a quote and does not end; a quote within a cell is an inch sign."""
+    opening = _OPENING.search(row)
+    while opening is not None:
+        ends = (one.end() for one in _QUOTES.finditer(row, opening.end()) if (one.end() - one.start()) % 2)
+        end = next((one for one in ends if row[one : one + 1] in {*",;| \t\r\n", ""}), None)
+        if end is None:
+            return True
+        opening = _OPENING.search(row, end)
+    return False
 
 
 def _refuse_long_line(place: int) -> None:
