@@ -193,6 +193,20 @@ def test_arrays_of_matlab_structures_are_channels_by_name(tmp_path: Path) -> Non
     np.testing.assert_array_equal(found["scope.signals.rig/Torque"], examples.TORQUE)
 
 
+def test_fields_of_matlab_keep_their_capitals_and_units_are_said_once(tmp_path: Path) -> None:
+    """`Gain` was called gain, and a channel `a [deg]` with a unit of its own `a [deg] [deg]`."""
+    rows = [
+        ("a [deg]", examples.ANGLE, "°", 1.0),
+        ("b (Nm)", examples.TORQUE, "N m", 2.0),
+        ("c [deg]", examples.TORQUE, "rad", 2.0),
+    ]
+    channels = _structures(("name", "data", "unit", "Gain"), [(name, of[:, None], *rest) for name, of, *rest in rows])
+    savemat(tmp_path / "x.mat", {"channels": channels})
+    with pytest.warns(recordings.FileWarning, match=r"its name says 'deg', and the file 'rad', which is taken"):
+        found = recordings.read(tmp_path / "x.mat")
+    assert list(found) == ["channels.a [°]", "channels.b [N m]", "channels.c [deg] [rad]", "channels.Gain"]
+
+
 def test_channels_of_tdms_that_began_later_have_times_of_their_own(tmp_path: Path) -> None:
     """Two devices that started 5 samples apart were read as if sampled together: a lag that nobody heard of."""
     start = np.datetime64("2024-01-01T10:00:00.5")

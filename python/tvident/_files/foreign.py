@@ -19,6 +19,7 @@ from tvident._files.channels import Channels, FileError, Say
 from tvident._files.names import listed, printable
 from tvident._files.text import read_columns
 from tvident._formats import FORMATS, PROCESS
+from tvident._units import named_unit, unit_of, with_unit
 
 _BYTES, _BYTES_FOR_EACH = 2 << 30, 64
 """Memory of the reader: what its libraries take, and compressed content."""
@@ -83,9 +84,28 @@ def read_foreign(path: Path, say: Say) -> Channels:
         raise FileError(f"{kind.name} must be whole; its reader says: {printable(last['error'], 300)}; {kind.cure}")
     if last["skipped"]:
         say(f"not read: {listed(last['skipped'])}")
+    channels = _with_one_unit(channels, say)
     for text in texts:
         channels |= read_columns(io.StringIO(text), say)
     return channels
+
+
+def _with_one_unit(channels: Channels, say: Say) -> Channels:
+    """Return channels whose names say a unit once, where they say one and the file another time: ``a [deg] [deg]``."""
+    found: Channels = {}
+    for name, values in channels.items():
+        inner, unit = named_unit(name)
+        bare, said = named_unit(inner)
+        single = with_unit(bare, unit)
+        if said and bare and inner.endswith(("]", ")")) and unit_of(said) is not None:
+            if unit_of(said) != unit_of(unit):
+                said, taken = printable(said, 20), printable(unit, 20)
+                say(f"channel '{printable(name, 60)}': its name says '{said}', and the file '{taken}', which is taken")
+            elif single not in channels and single not in found:
+                found[single] = values
+                continue
+        found[name] = values
+    return found
 
 
 def _arrays(pipe: IO[bytes], last: dict[str, Any], texts: list[str]) -> Iterator[tuple[str, Any]]:

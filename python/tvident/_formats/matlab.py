@@ -125,7 +125,8 @@ def _several_channels(fields: Mapping[str, Any]) -> list[tuple[str, Any]]:
     for name, unit, one in zip(names, units, samples, strict=True):
         used[name] = used.get(name, 0) + 1
         found.append((_with_unit(name if used[name] == 1 else f"{name}_{used[name]}", unit), one))
-    others = {name: one for name, one in lower.items() if name not in {*values, *_NAMES, *_UNITS}}
+    read = {*values, *_NAMES, *_UNITS, *_SHAPES}
+    others = {name: one for name, one in fields.items() if str(name).lower() not in read}
     return [*found, *_flat("", others)]
 
 
