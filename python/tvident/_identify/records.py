@@ -31,7 +31,7 @@ _CHANCE = 3.09
 
 def names_shared(share: str | Sequence[str]) -> tuple[str, ...]:
     """Return what records share, by name, each once."""
-    names = (share,) if isinstance(share, str) else tuple(share)
+    names = tuple(share) if isinstance(share, list | tuple | set | frozenset | dict) else (share,)
     return tuple(dict.fromkeys(arguments.one_of("share", name, COEFFICIENTS) for name in names))
 
 
@@ -44,12 +44,13 @@ def calls_of_records(call: Mapping[str, Any], share: Sequence[str]) -> list[dict
         If channels have different numbers of records, or what is to be shared cannot be.
     """
     motion = next((name for name in _CHANNELS if call[name] is not None), "torque")
-    count = _records(call[motion])
+    count = _records(motion, call[motion])
     if share:
         count = count or _records_of_batch(motion, call[motion])
         _check_shared(share, call)
     elif count is None or len({np.shape(one)[-1] for one in call[motion]}) == 1:
         return None
+    _check_each_is_one(call)
     calls: list[dict[str, Any]] = [{} for _ in range(count)]
     for name, value in call.items():
         for place, one in enumerate(_each(name, value, count)):
@@ -61,7 +62,7 @@ def identify_records(
     single: Single, calls: Sequence[Mapping[str, Any]], share: Sequence[str], progress: arguments.Progress
 ) -> IdentifiedRecords:
     """Identify every record, and what they share from all of them."""
-    sizes = [int(np.shape(call["torque"])[-1]) for call in calls]
+    sizes = [int(np.size(call["torque"])) for call in calls]
     rounds = 2 + len(share) if share else 1
     total, before = rounds * sum(sizes), 0
     with arguments.reporter(progress, "identification") as report:
@@ -100,11 +101,35 @@ def identify_records(
     return IdentifiedRecords(together, shared)
 
 
-def _records(values: Any) -> int | None:
+def _records(name: str, values: Any) -> int | None:
     """Return how many records a list holds; None where it is none, or one record of numbers."""
-    if not isinstance(values, list | tuple) or not values or any(np.ndim(one) == 0 for one in values):
+    if not isinstance(values, list | tuple) or not values:
+        return None
+    if any(not _shape(f"{name}[{place}]", one) for place, one in enumerate(values)):
         return None
     return len(values)
+
+
+def _shape(name: str, values: Any) -> tuple[int, ...]:
+    try:
+        return np.shape(values)
+    except ValueError:
+        raise ValueError(
+            f"{name} must be a regular array of numbers; got {arguments.shown(values)}; where records have different lengths, give one "
+            f"list of them, each an array of its own: [first, second]"
+        ) from None
+
+
+def _check_each_is_one(call: Mapping[str, Any]) -> None:
+    """Check that what a list holds of a channel is one record each."""
+    for name in _CHANNELS:
+        for place, one in enumerate(call[name] if _records(name, call[name]) else ()):
+            shape = _shape(f"{name}[{place}]", one)
+            if len(shape) > 1 and shape[1:] != (1,):
+                raise ValueError(
+                    f"every record of a list must have one dimension where lengths differ or something is shared; got {name}[{place}] of "
+                    f"shape {shape}; put its records into the list, one after the other"
+                )
 
 
 def _records_of_batch(name: str, values: Any) -> int:
@@ -133,7 +158,7 @@ def _each(name: str, value: Any, count: int) -> Sequence[Any]:
     if value is None or name not in (*_CHANNELS, *_OTHERS):
         return [value] * count
     if name in _CHANNELS:
-        several = _records(value)
+        several = _records(name, value)
         if several is None and name != "t" and np.ndim(value) > 1:
             several, value = len(value), list(value)
         if several is None and name == "t":
