@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -197,3 +198,17 @@ def test_models_of_nothing_have_no_score() -> None:
     assert not compared.table["weight"].any()
     assert np.isnan(compared.averaged["stiffness"][0]).all()
     assert "nan" in compared.summary()
+
+
+def test_a_models_name_is_drawn_as_text(tmp_path: Path) -> None:
+    """A control character has no glyph, "$x_" was read as a formula, and a long name left no room for the bars."""
+    rig = tvident.simulate_torsional_rig(duration=1.0)
+    names = ("bell\x07", "$x_$", "x" * 300)
+    models: dict[str, Any] = {name: {"damping": 0.03 + place / 100} for place, name in enumerate(names)}
+    found = tvident.compare_models(rig.angle, rig.torque, models=models, sample_rate=1000, stiffness="constant")
+    figure = found.plot()
+    drawn = {one.get_text() for one in figure.axes[0].get_yticklabels()}
+    assert drawn == {r"bell\x07", r"\$x_\$", "x" * 57 + "..."}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figure.savefig(tmp_path / "x.png")

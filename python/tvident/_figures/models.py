@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from tvident._figures.style import ACCENT, FOUND, Place, panels, style
+from tvident._figures.style import ACCENT, FOUND, Place, panels, plain, style
 
 
 def plot_models(table: Mapping[str, npt.NDArray[Any]], ax: Place = None) -> Figure:
@@ -33,7 +33,7 @@ def plot_models(table: Mapping[str, npt.NDArray[Any]], ax: Place = None) -> Figu
         panel.barh(places, table["weight"], color=[ACCENT] + [FOUND] * (count - 1), height=0.62)
         for place, weight, difference in zip(places, table["weight"], table["difference"], strict=True):
             panel.annotate(f" +{difference:.1f}", (weight, place), va="center", fontsize=8.5)
-        panel.set_yticks(places, [str(name) for name in table["model"]])
+        panel.set_yticks(places, [plain(str(name)) for name in table["model"]])
         panel.invert_yaxis()
         panel.set_xlim(0, 1.12)
         panel.grid(visible=False)

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from tvident._equation import UNITS
+from tvident._files import printable
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -200,6 +201,5 @@ def legend(ax: Axes, place: Place = None) -> None:
 
 
 def plain(name: str) -> str:
-    """Return a name that is no formula, and no longer than a title may be beside the axes that it stands over."""
-    short = name if len(name) <= _LONGEST_NAME else f"{name[: _LONGEST_NAME - 3]}..."
-    return short.replace("$", r"\$")
+    r"""Return a name that is no formula, has no control characters (``\x07``), and is no longer than a title beside its axes may be."""
+    return printable(name, _LONGEST_NAME).replace("$", r"\$")
