@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import gzip
+import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
+from click.testing import CliRunner
 
+import tvident
 from tvident import recordings
+from tvident._command_line import main
+from tvident._files import unpacked
 
 
 def read(folder: Path, content: str) -> dict[str, list[float]]:
@@ -25,3 +32,100 @@ def test_a_name_in_quotes_may_hold_an_inch_sign(tmp_path: Path) -> None:
     found = read(tmp_path, '"stroke 3"" [mm]\nraw","torque\nNm"\n1,2\n3,4\n')
     assert list(found) == ['stroke 3" [mm] raw', "torque Nm"]
     assert list(read(tmp_path, 't,stroke 3",force\n1,2,3\n3,4,5\n')) == ["t", "stroke 3", "force"]
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+@pytest.mark.parametrize("names", ["Winkel [°];M/Nm", "角度;トルク"])
+def test_utf_16_is_known_without_a_mark(tmp_path: Path, encoding: str, names: str) -> None:
+    """It was refused for the character NUL."""
+    (tmp_path / "x.csv").write_bytes(f"{names}\n1,5;2\n3;4,25\n".encode(encoding))
+    found = recordings.read(tmp_path / "x.csv")
+    assert list(found) == names.split(";")
+    assert [values.tolist() for values in found.values()] == [[1.5, 3], [2, 4.25]]
+    (tmp_path / "x.csv").write_bytes("a;b\n1;2\n".encode(encoding)[:-1])
+    with pytest.raises(recordings.FileError, match=f"a text that begins as {encoding} must end so"):
+        recordings.read(tmp_path / "x.csv")
+
+
+def test_fortran_writes_d_before_exponents(tmp_path: Path) -> None:
+    assert read(tmp_path, " 1.0D+03  2.5d-01\n 3.0D+00  -.5D-002\n") == {"0": [1000, 3], "1": [0.25, -0.005]}
+    assert read(tmp_path, "a,b\n0.1D+01,1.5\n0.2D+01,2.5\n,1E3\n")["a"][:2] == [1, 2]
+    # What may be no number at all stays none.
+    (tmp_path / "x.csv").write_text("t,id\n1,1D3\n2,2D4\n")
+    with pytest.raises(recordings.FileError, match="'1D3' in line 2 is no number"):
+        recordings.read(tmp_path / "x.csv")
+
+
+@pytest.mark.parametrize(
+    ("content", "expected", "said"),
+    [
+        (
+            "a,b\n1,#DIV/0!\n2,3\n#N/A,4\n5,#REF!\n",
+            [[1, 2, None, 5], [None, 3, 4, None]],
+            "2 cells hold errors .*'#DIV/0!' in line 2",
+        ),
+        (
+            "a;b\n1;2,5\n2;#WERT!\n3;1\n",
+            [[1, 2, 3], [2.5, None, 1]],
+            "one cell holds an error .*'#WERT!' in line 3, column 'b'",
+        ),
+        ("a;b\n#BEZUG!;1\n2;#¡DIV/0!\n3;#NV\n", [[None, 2, 3], [1, None, None]], "2 cells hold errors"),
+    ],
+)
+def test_errors_of_spreadsheets_are_missing_and_counted(
+    tmp_path: Path, content: str, expected: list[list[float | None]], said: str
+) -> None:
+    """`#REF!` began a comment, before which a cell was missing. `#N/A` is what a sheet writes for a missing value on purpose."""
+    with pytest.warns(recordings.FileWarning, match=said):
+        found = read(tmp_path, content)
+    np.testing.assert_array_equal(list(found.values()), np.array(expected, dtype=float))
+
+
+def test_what_only_begins_as_an_error_is_a_comment(tmp_path: Path) -> None:
+    content = "#N/A means missing\na,b\n1,2 #REF! to another sheet\n3,4#note\n"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert read(tmp_path, content) == {"a": [1, 3], "b": [2, 4]}
+
+
+def test_packed_text_is_read_as_what_it_holds(tmp_path: Path) -> None:
+    tvident.simulate_torsional_rig(duration=2.0).save(tmp_path / "rig.csv")
+    whole = (tmp_path / "rig.csv").read_bytes()
+    (tmp_path / "rig.csv.gz").write_bytes(gzip.compress(whole))
+    found, expected = recordings.read(tmp_path / "rig.csv.gz"), recordings.read(tmp_path / "rig.csv")
+    assert list(found) == list(expected)
+    for name, values in expected.items():
+        np.testing.assert_array_equal(found[name], values)
+    for place in ("rig.csv", "rig.csv.gz"):
+        tvident.identify_file(
+            tmp_path / place,
+            tmp_path / f"{place}.npy",
+            angle="angle",
+            torque="torque",
+            sample_rate=1000,
+            stiffness="constant",
+        )
+    np.testing.assert_array_equal(np.load(tmp_path / "rig.csv.npy"), np.load(tmp_path / "rig.csv.gz.npy"))
+    packed, plain = (CliRunner().invoke(main, ["info", "-"], input=one) for one in (gzip.compress(whole), whole))
+    assert packed.exit_code == 0
+    assert packed.stdout == plain.stdout
+
+
+def test_a_packed_text_is_whole_and_of_a_size_that_recordings_have(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    packed = gzip.compress(b"a,b\n" + b"1,2\n" * 100_000)
+    place = tmp_path / "x.csv.gz"
+    for content in (packed[:-20], packed + b"more", packed[:40] + b"\xff\xff" + packed[42:]):
+        place.write_bytes(content)
+        with pytest.raises(recordings.FileError, match=r"as \.csv\.gz: a packed file must be whole; .*; copy it again"):
+            recordings.read(place)
+    place.write_bytes(packed)
+    monkeypatch.setattr(unpacked, "_LARGE", 100_000)
+    with pytest.raises(recordings.FileError, match=r"at most 200 times its size, .*; unpack it yourself"):
+        recordings.read(place)
+    place.write_bytes(b"a,b\n1,2\n")  # a browser may have unpacked it already
+    assert list(recordings.read(place)) == ["a", "b"]
+    place.write_bytes(gzip.compress(packed))
+    with pytest.raises(recordings.FileError, match=r"this is a gzip file; unpack it$"):
+        recordings.read(place)

@@ -252,6 +252,19 @@ def test_words_of_sheets_are_no_formulas_and_hold_nothing_that_sheets_refuse(tmp
     assert rows[0][1].value == rows[1][0].value == printable(name)
 
 
+def test_errors_in_a_sheet_are_missing_and_counted(tmp_path: Path) -> None:
+    """They were missing without a word."""
+    book = import_module("openpyxl").Workbook()
+    for row in (("a", "b"), (1.0, "#DIV/0!"), (2.0, 5.0), ("#SPILL!", "#N/A")):
+        book.active.append(row)
+    book.save(tmp_path / "x.xlsx")
+    with pytest.warns(
+        recordings.FileWarning, match="2 cells hold errors of a spreadsheet, read as missing: '#DIV/0!' in"
+    ):
+        found = recordings.read(tmp_path / "x.xlsx")
+    np.testing.assert_array_equal(list(found.values()), [[1, 2, np.nan], [np.nan, 5, np.nan]])
+
+
 @pytest.mark.filterwarnings("ignore")  # of libraries about each other
 def test_tables_of_matlab_are_channels(tmp_path: Path) -> None:
     times = pd.to_timedelta(1e3 * examples.T, unit="ms")

@@ -36,6 +36,7 @@ _BEGINNINGS = {
     b"\x89MCAP": ".mcap",
     b"#ROSBAG": ".bag",
     b"LabVIEW": ".lvm",
+    b"\x1f\x8b": ".csv.gz",
 }
 """How files begin."""
 

@@ -12,6 +12,7 @@ from tvident._files.results import ENDINGS as RESULT_ENDINGS
 from tvident._files.results import read_result, write_result
 from tvident._files.table import aligned, write_csv, write_table
 from tvident._files.text import copy_text
+from tvident._files.unpacked import ending_of
 
 __all__ = [
     "RESULT_ENDINGS",
@@ -27,6 +28,7 @@ __all__ = [
     "check_folder",
     "check_place",
     "copy_text",
+    "ending_of",
     "full_name",
     "increasing_times",
     "is_time",

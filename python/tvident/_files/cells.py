@@ -13,6 +13,9 @@ _MINUS = re.compile("^[\N{MINUS SIGN}\N{EN DASH}](?=[\\d.,])|(?<=[eE])\N{MINUS S
 """What word processors and some programs write for it."""
 
 _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_FORTRAN = re.compile(r"([+-]?(?:\d+\.\d*|\.\d+))[dD]([+-]?\d{1,3})", re.ASCII)
+"""Double precision as Fortran writes it."""
+
 _COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
 _GROUPS = re.compile(
     r"[+-]?[1-9]\d{0,2}(?:(?P<blank>[ '\u2019\u00a0\u2009\u202f])\d{3}(?:(?P=blank)\d{3})*(?P<behind>[.,]\d*)?"
@@ -25,8 +28,18 @@ _BLANKS = re.compile("[ '\u2019\u00a0\u2009\u202f]")
 
 _ONE_GROUP = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)
 _INFINITE = re.compile(r"([+-]?)(inf|infinity|1\.#inf)", re.IGNORECASE)
-_MISSING = re.compile(r"([+-]?nan|n/?a|-{1,3}|\*{1,12}|#n/a|null|none|[+-]?1\.#(qnan|snan|ind))?", re.IGNORECASE)
-_NOT_A_COMMENT = re.compile(r"#(?=(n/a|div/0|ref!|value!|num!|name\?|null!|qnan|snan|ind|inf)\b)", re.IGNORECASE)
+_MISSING = re.compile(r"([+-]?nan|n/?a|-{1,3}|\*{1,12}|#n/[ad]|#nv|null|none|[+-]?1\.#(qnan|snan|ind))?", re.IGNORECASE)
+_ERROR = (
+    "#(?:n/a|n/d|nv|div/0|¡?(?:div/0|ref|bezug|rif|value|wert|valeur|valor|valore|num|zahl|nombre|name|nom|nome|null|nul|nulo|calc|spill"
+    "|überlauf)[!?])(?=\\s*(?:[\\t,;|\"']|$)|\\s+[-+.#\\d\"'])"
+)
+"""What spreadsheets write where a formula found no number, in some languages."""
+
+_IS_ERROR = re.compile(_ERROR, re.IGNORECASE)
+_NOT_AVAILABLE = re.compile("#(?:n/[ad]|nv)", re.IGNORECASE)
+"""What a sheet writes on purpose, for a value that is missing."""
+
+_NOT_A_COMMENT = re.compile(rf"{_ERROR}|#(?:qnan|snan|ind|inf)\b", re.IGNORECASE | re.MULTILINE)
 _IN_QUOTES = re.compile(r'"[^"]*"|[^\s"]+')
 
 
@@ -59,6 +72,16 @@ def hides_numbers(text: str) -> bool:
     return "#" in text and _NOT_A_COMMENT.search(text) is not None
 
 
+def is_error(cell: str) -> bool:
+    """Return whether a spreadsheet says in a cell that a formula found no number."""
+    return cell.startswith("#") and _IS_ERROR.fullmatch(cell) is not None and not _NOT_AVAILABLE.fullmatch(cell)
+
+
+def fortran_as_usual(text: str) -> str:
+    """Return text with ``e`` where Fortran writes a D between a number and its exponent."""
+    return _FORTRAN.sub(r"\1e\2", text) if "D" in text or "d" in text else text
+
+
 def number(cell: str, *, comma: bool, decimal: str | None = None) -> float | None:
     """Return the number in a cell, NaN where it says that there is none, None where it says anything else.
 
@@ -69,11 +92,11 @@ def number(cell: str, *, comma: bool, decimal: str | None = None) -> float | Non
         return math.nan
     if not cell.isascii():
         cell = _MINUS.sub("-", cell)
-    plain = _plain(cell, comma=comma, decimal=decimal)
+    plain = _plain(fortran_as_usual(cell), comma=comma, decimal=decimal)
     if plain is not None:
         value = float(plain)
         return value if math.isfinite(value) else None
-    if _MISSING.fullmatch(cell):
+    if _MISSING.fullmatch(cell) or is_error(cell):
         return math.nan
     infinite = _INFINITE.fullmatch(cell)
     return float(f"{infinite[1]}inf") if infinite else None

@@ -11,9 +11,11 @@ from typing import cast
 
 from tvident._files.channels import Channels, FileError, FileWarning, Say
 from tvident._files.names import printable
+from tvident._files.unpacked import ending_of
 from tvident._formats import FORMATS
 
 TEXT, NUMPY = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm", ".mot", ".sto"), (".npy", ".npz")
+PACKED = (".csv.gz", ".txt.gz", ".tsv.gz", ".dat.gz", ".asc.gz")
 ARROW = (".parquet", ".feather", ".arrow")
 """Endings of files that can be read."""
 
@@ -21,7 +23,7 @@ ARROW = (".parquet", ".feather", ".arrow")
 RECIPE = "numpy.savez('x.npz', angle=…, torque=…, sample_rate=…)"
 """What anybody can do about a file that nobody reads."""
 
-_READERS = dict.fromkeys(TEXT, "text.read_text") | {
+_READERS = dict.fromkeys((*TEXT, *PACKED), "text.read_text") | {
     ".npy": "arrays.read_npy",
     ".npz": "arrays.read_npz",
     ".lvm": "instrument_text.read_labview",
@@ -34,7 +36,7 @@ _READERS = dict.fromkeys(TEXT, "text.read_text") | {
 
 
 def _reader(path: Path) -> Callable[[Path, Say], Channels]:
-    module, _, function = _READERS[path.suffix.lower()].partition(".")
+    module, _, function = _READERS[ending_of(path).lower()].partition(".")
     return cast("Callable[[Path, Say], Channels]", getattr(import_module(f"tvident._files.{module}"), function))
 
 
@@ -51,9 +53,10 @@ def check_readable(path: Path, endings: Iterable[str]) -> None:
         raise FileError(f"{place}: is no name of a file ({error.args[-1]}); check it") from None
     if kind is not None and stat.S_ISDIR(kind):
         raise FileError(f"{place}: this is a folder; name a file in it")
-    if path.suffix.lower() not in endings:
+    ending = ending_of(path)
+    if ending.lower() not in endings:
         known = ", ".join(endings)
-        got = f"'{printable(path.suffix)}'" if path.suffix else "none"
+        got = f"'{printable(ending)}'" if ending else "none"
         raise FileError(
             f"{place}: the ending must be one of {known}; got {got}; rename the file, or convert it in Python: {RECIPE}"
         )
@@ -99,8 +102,9 @@ def read(path: str | Path) -> Channels:
     decimal sign where semicolons, tabs or blanks separate cells, or numbers are in quotes. Thousands may be separated (``1,234.5``,
     ``1 234``); where a sign may be either, the other numbers of the file decide, or it is refused. Times (``12:30:00.5``,
     ``2024-12-31T12:30:00``) become seconds: of the day, or since the first where there are dates. Columns of words are not read, which is
-    said. An empty cell, ``nan``, ``NA`` or ``null`` is a missing value. Comments begin with #. Files of LabVIEW (``.lvm``) and OpenSim
-    (``.mot``, ``.sto``) have the units of their headers.
+    said. An empty cell, ``nan``, ``NA`` or ``null`` is a missing value, and so is an error of a spreadsheet (``#DIV/0!``), which is said.
+    ``1.0D+03`` is a number of Fortran. Comments begin with #. Text that gzip packed (``.csv.gz``) is read as what it holds. Files of
+    LabVIEW (``.lvm``) and OpenSim (``.mot``, ``.sto``) have the units of their headers.
 
     See Also
     --------
@@ -128,7 +132,8 @@ def read(path: str | Path) -> Channels:
     try:
         channels = _reader(path)(path, said.append)
     except FileError as error:
-        kind = FORMATS[path.suffix.lower()].name if path.suffix.lower() in FORMATS else path.suffix
+        ending = ending_of(path)
+        kind = FORMATS[ending.lower()].name if ending.lower() in FORMATS else ending
         raise FileError(f"{place}: cannot be read as {kind}: {error}") from None
     except PermissionError:
         raise FileError(f"{place}: may not be read; check its permissions") from None

@@ -11,7 +11,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tvident._files.cells import decimal_sign, hides_numbers, is_present, number, split, without_comment
+from tvident._files.cells import (
+    decimal_sign,
+    fortran_as_usual,
+    hides_numbers,
+    is_error,
+    is_present,
+    number,
+    split,
+    without_comment,
+)
 from tvident._files.channels import FileError, Say
 from tvident._files.dialect import Dialect
 from tvident._files.headers import CURE, not_a_number
@@ -72,6 +81,9 @@ class Rows:
         """Where columns of words have their first, and the word."""
         self._numbers: set[int] = set()
         """Columns without anything in the first lines that have numbers further below."""
+        self._errors: list[tuple[int, int, str]] = []
+        """Line, column and cell of the first error of a spreadsheet."""
+        self._error_count = 0
         self.hollow = 0
         """Rows at the end that hold separators alone."""
         self.times = {column: TimeColumn(cells) for column, cells in dialect.times.items()}
@@ -125,6 +137,12 @@ class Rows:
             self._say(
                 f"column '{printable(self._dialect.names[column], 40)}': not read, it holds words{remark and ': ' + remark}"
             )
+        for place, column, cell in self._errors:
+            count = f"{self._error_count} cells hold errors" if self._error_count > 1 else "one cell holds an error"
+            name = printable(self._dialect.names[column], 40)
+            self._say(
+                f"{count} of a spreadsheet, read as missing: '{printable(cell, 40)}' in line {place}, column '{name}'"
+            )
         if self.hollow:
             self._say(f"the last {'row holds' if self.hollow == 1 else f'{self.hollow} rows hold'} nothing: not read")
         if self._words is not None:
@@ -135,6 +153,7 @@ class Rows:
     def _in_bulk(self, text: str) -> Numbers | None:
         """Return the rows of a text that holds nothing but numbers, None where something else may be in it."""
         d = self._dialect
+        text = fortran_as_usual(text) if d.is_plain else text
         bare = text if d.is_plain else _TIMES.sub("", text)
         has = {".": "." in bare, ",": d.comma and "," in bare}
         was = {sign: bool(self._signs[sign] or self._doubtful[sign]) for sign in ".,"}
@@ -297,6 +316,9 @@ class Rows:
             raise FileError(not_a_number(place, d.names[column], cell))
         if math.isfinite(value):
             self._note_sign(place, cell)
+        elif is_error(cell):
+            self._errors = self._errors or [(place, column, cell)]
+            self._error_count += 1
         return value
 
     def _note_remark(self, place: int, column: int, value: float | None) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -16,6 +17,7 @@ from tvident._files.dialect import Dialect, dialect_of, mixed_line
 from tvident._files.headers import CURE
 from tvident._files.names import printable
 from tvident._files.rows import Numbers, OtherDecimalSignError, Rows, check_text
+from tvident._files.unpacked import opened
 from tvident._units import named_unit, with_unit
 
 Content = TypeVar("Content")
@@ -24,6 +26,9 @@ _HEAD, _PIECE = 1 << 20, 1 << 22
 """Characters in which the numbers must begin; characters that are read at once: an interrupt is heard between."""
 
 _LONGEST_LINE = 1_000_000
+
+_START, _MOSTLY = 4096, 0.3
+"""Bytes that show the alphabet of a text, and the part of its letters that are digits and other letters of one byte."""
 
 _MOST_ABOVE, _TALLEST = 100, 8
 """Lines above the numbers that are looked at, and lines of one row of names."""
@@ -47,40 +52,50 @@ _COMPRESSED = {
 
 def read_text(path: Path, say: Say) -> Channels:
     """Read columns of numbers, with or without names, separated by commas, semicolons, tabs, bars or blanks."""
-    return _decoded(path, lambda encoding: _with_decimal_sign(path, encoding, say))
+    return _decoded(path, lambda file: read_columns(file, say))
 
 
 def read_whole(path: Path) -> str:
     """Return a text of which all must be known before it can be read."""
-    return _decoded(path, lambda encoding: path.read_text(encoding=encoding))
+    return _decoded(path, lambda file: file.read())
 
 
-def _decoded(path: Path, read: Callable[[str], Content]) -> Content:
+def _decoded(path: Path, read: Callable[[TextIO], Content]) -> Content:
     """Read a text in the alphabet that it is written in."""
-    with path.open("rb") as file:
-        start = file.read(8)
+    with opened(path) as file:
+        start = file.read(_START)
     for magic, kind in _COMPRESSED.items():
         if start.startswith(magic):
-            raise FileError(f"a text must not be compressed; this is a {kind} file; unpack it")
-    # UTF-8, or else the Western European alphabet of older programs, in which every byte is a letter.
-    encodings = ("utf-8-sig", "latin-1")
-    for encoding, mark in (("utf-32", (b"\xff\xfe\0\0", b"\0\0\xfe\xff")), ("utf-16", (b"\xff\xfe", b"\xfe\xff"))):
-        if start.startswith(mark):
-            encodings = (encoding, encoding)
-            break
+            cure = ", or let its name end in .csv.gz" if kind == "gzip" and path.suffix.lower() != ".gz" else ""
+            raise FileError(f"a text must not be compressed; this is a {kind} file; unpack it{cure}")
+    encodings = _encodings(start)
     try:
-        return read(encodings[0])
+        return _read_as(path, encodings[0], read)
     except UnicodeError:
-        if encodings[0] == encodings[1]:
+        if len(encodings) == 1:
             raise FileError(
                 f"a text that begins as {encodings[0]} must end so; it does not; save it as UTF-8"
             ) from None
-        return read(encodings[1])
+        return _read_as(path, encodings[1], read)
 
 
-def _with_decimal_sign(path: Path, encoding: str, say: Say) -> Channels:
-    with path.open(encoding=encoding) as file:
-        return read_columns(file, say)
+def _read_as(path: Path, encoding: str, read: Callable[[TextIO], Content]) -> Content:
+    with io.TextIOWrapper(opened(path), encoding=encoding) as file:
+        return read(file)
+
+
+def _encodings(start: bytes) -> tuple[str, ...]:
+    """Return the alphabets that a text which begins so may be written in."""
+    for encoding, marks in (("utf-32", (b"\xff\xfe\0\0", b"\0\0\xfe\xff")), ("utf-16", (b"\xff\xfe", b"\xfe\xff"))):
+        if start.startswith(marks):
+            return (encoding,)
+    # Without a mark: of digits and Western letters one of two bytes is zero in UTF-16, and in no other alphabet.
+    even, odd = (start[side::2].count(0) for side in (0, 1))
+    for encoding, zeros, others in (("utf-16-le", odd, even), ("utf-16-be", even, odd)):
+        if zeros > _MOSTLY * (len(start) // 2) and others < zeros / 20:
+            return (encoding,)
+    # UTF-8, or else the Western European alphabet of older programs, in which every byte is a letter.
+    return "utf-8-sig", "latin-1"
 
 
 def read_columns(file: TextIO, say: Say) -> Channels:
@@ -100,22 +115,21 @@ def read_columns(file: TextIO, say: Say) -> Channels:
 def copy_text(path: Path, rows: IO[bytes], say: Say) -> list[str | None]:
     """Copy the columns of a text, row by row, as 64-bit floats; return their names, None where a column holds no numbers."""
 
-    def copy(encoding: str) -> list[str | None]:
-        with path.open(encoding=encoding) as file:
-            decimal = None
-            while True:
-                said: list[str] = []
-                file.seek(0)
-                rows.seek(0)
-                try:
-                    names = _copied(file, rows, decimal, said.append)
-                except OtherDecimalSignError as found:
-                    decimal = found.sign
-                    continue
-                rows.truncate()
-                for message in said:
-                    say(message)
-                return names
+    def copy(file: TextIO) -> list[str | None]:
+        decimal = None
+        while True:
+            said: list[str] = []
+            file.seek(0)
+            rows.seek(0)
+            try:
+                names = _copied(file, rows, decimal, said.append)
+            except OtherDecimalSignError as found:
+                decimal = found.sign
+                continue
+            rows.truncate()
+            for message in said:
+                say(message)
+            return names
 
     return _decoded(path, copy)
 

@@ -12,6 +12,9 @@ from tvident._formats.told import Sheet
 _OF_THE_FULLEST = 0.1
 """A sheet with fewer numbers than this part of the fullest describes the recording rather than being it."""
 
+_ERRORS = frozenset(("#N/A", "#DIV/0!", "#REF!", "#VALUE!", "#NUM!", "#NAME?", "#NULL!"))
+"""What cells say whose formula found no number; newer programs have more words."""
+
 _BREAKS = str.maketrans({"\t": " ", "\n": " ", "\r": " ", '"': "'", "#": " "})
 
 
@@ -57,9 +60,11 @@ def _cell(value: Any) -> str:
         return value.isoformat()
     if isinstance(value, bool | float | int | timedelta):
         return repr(value.total_seconds() if isinstance(value, timedelta) else +value)
-    text = str(value).translate(_BREAKS).strip()
-    # What a formula could not compute is no number.
-    return "" if str(value).startswith("#") and str(value).endswith(("!", "?", "A")) else text
+    text = str(value)
+    if text.startswith("#") and text.endswith(("!", "?", "A")):
+        # What a formula could not compute is no number, whatever it is called.
+        return text if text in _ERRORS else "#VALUE!"
+    return text.translate(_BREAKS).strip()
 
 
 def _is_number(value: Any) -> bool:

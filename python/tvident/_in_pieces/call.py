@@ -14,7 +14,7 @@ from tvident import _arguments as arguments
 from tvident import _core
 from tvident._choices import VERSION
 from tvident._equation import GivenTerm
-from tvident._files import check_apart, full_name, is_time
+from tvident._files import check_apart, ending_of, full_name, is_time
 from tvident._identify import Method
 from tvident._in_pieces.copied import copied
 from tvident._in_pieces.found import FileIdentification
@@ -157,7 +157,7 @@ def identify_file(
         "lag": lag,
         "quantisation": quantisation,
     }
-    is_text = source_path.suffix.lower() in TEXT
+    is_text = ending_of(source_path).lower() in TEXT
     mark = mark_of(source_path) if source_path.exists() else ""
     told = {
         "version": VERSION,

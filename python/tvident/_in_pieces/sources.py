@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from tvident._files import FileError, full_name, listed, printable
+from tvident._files import FileError, ending_of, full_name, listed, printable
 from tvident._units import named_unit
 
 _UNITS = ("unit", "units", "Unit", "Units", "UNITS")
@@ -219,7 +219,7 @@ READERS: dict[str, Callable[[Path], Source]] = {
 }
 """By the ending."""
 
-TEXT = (".csv", ".txt", ".tsv", ".dat")
+TEXT = (".csv", ".txt", ".tsv", ".dat", ".csv.gz", ".txt.gz", ".tsv.gz", ".dat.gz")
 """Endings of text, which is copied to rows of numbers before anything is done with it."""
 
 
@@ -233,7 +233,7 @@ def opened(path: Path) -> Source:
     ImportError
         If its library is missing.
     """
-    place, ending = printable(path), path.suffix.lower()
+    place, ending = printable(path), ending_of(path).lower()
     if not path.exists():
         raise FileError(f"{place}: there is no such file; check the name and the folder")
     if ending != ".zarr" and not path.is_file():
