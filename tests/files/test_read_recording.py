@@ -98,3 +98,28 @@ def test_groups_that_were_sampled_together_have_one_clock() -> None:
     assert tvident.FileRecording(groups).sample_rate == 100
     apart = groups | {"right.time [s]": times + 0.005}
     assert tvident.FileRecording(apart).time is None
+
+
+def test_times_of_few_digits_tell_the_rate_unless_samples_were_lost() -> None:
+    """512 Hz in three digits was refused, which `identify` takes; 998 Hz would be a wrong rate of 1000 Hz with samples lost."""
+    angle = np.sin(np.arange(5000) / 40)
+    printed = tvident.FileRecording({"time": np.round(np.arange(5000) / 512, 3), "angle": angle})
+    assert printed.sample_rate == 512
+    there = np.arange(5000) % 500 != 499
+    lost = {"time": np.arange(5000)[there] / 1000, "sample": np.flatnonzero(there), "angle": angle[there]}
+    with pytest.raises(
+        ValueError, match=r"those of the recording are not: samples are lost before t\[499\] = 0.5; pass t="
+    ):
+        _ = tvident.FileRecording(lost).sample_rate
+    uneven = np.arange(4990) / 1000
+    uneven[2000:] += 0.5
+    with pytest.raises(
+        ValueError, match="uniform to a thousandth of their step; those of the recording are not; pass t="
+    ):
+        _ = tvident.FileRecording({"time": uneven, "angle": angle[:4990]}).sample_rate
+    coarse = np.round(np.arange(5000) / 1024, 2)
+    with pytest.raises(
+        ValueError,
+        match="a sample rate needs times that tell it; those of the recording do not: t must tell samples apart",
+    ):
+        _ = tvident.FileRecording({"time": coarse, "angle": angle}).sample_rate

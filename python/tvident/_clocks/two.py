@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -92,15 +93,25 @@ class TwoClocks:
         return resampling.onto_grid(values), passed
 
 
-def two_clocks(angle: Any, torque: Any, samples: tuple[int, int], time_unit: str | None = None) -> TwoClocks:
+def two_clocks(
+    angle: Any, torque: Any, channels: Sequence[npt.NDArray[np.number]], time_unit: str | None = None
+) -> TwoClocks:
     """Return the clocks of two channels from times, or from sample rates of channels that begin together.
+
+    Parameters
+    ----------
+    angle, torque : float or array_like
+        Rates, or times.
+    channels : sequence of ndarray, shape (n,)
+        Samples of angle and torque, which tell whether some were lost.
+    time_unit : str, optional
 
     Raises
     ------
     ValueError
         If times do not increase, or share no time.
     """
-    own = [_grid(one, count, time_unit) for one, count in zip((angle, torque), samples, strict=True)]
+    own = [_grid(one, samples, time_unit) for one, samples in zip((angle, torque), channels, strict=True)]
     start = max(one.start for one in own)
     end = min(one.start + one.period * float(one.places[-1]) for one in own)
     period = min(one.period for one in own)
@@ -114,8 +125,9 @@ def two_clocks(angle: Any, torque: Any, samples: tuple[int, int], time_unit: str
     return TwoClocks(own[0], own[1], start, period, math.floor((end - start) / period + _SAME) + 1)
 
 
-def _grid(times: Any, samples: int, time_unit: str | None) -> Grid:
+def _grid(times: Any, channel: npt.NDArray[np.number], time_unit: str | None) -> Grid:
     """Return the clock of one channel."""
+    samples = channel.shape[-1]
     if np.ndim(times) == 0:
         period = arguments.sample_period(samples, sample_rate=times)
         start = 0.0
@@ -123,6 +135,7 @@ def _grid(times: Any, samples: int, time_unit: str | None) -> Grid:
         times = times_in_seconds(times, time_unit)
         try:
             period = arguments.sample_period(samples, t=times)
+            arguments.check_no_lost_samples(times, channel)
         except arguments.NotUniformError as error:
             return grid_of(error.times)
         start = float(arguments.times_of(times).flat[0])

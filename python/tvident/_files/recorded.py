@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _arguments as arguments
 from tvident._files.channels import Channels, full_name
 from tvident._files.names import listed, printable
 from tvident._files.recordings import read
@@ -38,14 +39,16 @@ _RATE = re.compile(r"(fs|f_s|fsamp|sample_?rate|sampling_?(rate|frequency)|sampl
 _PERIOD = re.compile(r"(ts|dt|delta_?t|t_?sample|t_?samp|sampl(e|ing)_?(time|period|interval))", re.IGNORECASE)
 """What single numbers are called that are samples per second, and seconds per sample."""
 
-_JITTER = 1e-3
-"""Of the sample period: how far times may lie from a uniform grid, as where arrays are taken."""
-
 
 def time_channels(names: Iterable[str]) -> list[str]:
     """Return the names, without units and groups, of channels that are called as times are."""
     bare = (named_unit(name)[0].rpartition(".")[2] for name in names)
     return [name for name in bare if _TIME.fullmatch(name)]
+
+
+def _increases(values: npt.NDArray[Any]) -> bool:
+    """Return whether a channel increases all the time, as another clock does, which tells nothing of this one."""
+    return bool((np.diff(np.asarray(values)) > 0).all())
 
 
 def increasing_times(channels: Mapping[str, npt.NDArray[Any]]) -> list[str]:
@@ -54,7 +57,7 @@ def increasing_times(channels: Mapping[str, npt.NDArray[Any]]) -> list[str]:
     for name, values in channels.items():
         unit = unit_of(named_unit(name)[1] or unit_said(values))
         is_duration = unit is not None and unit.dimension == ROTARY.dimensions["time"]
-        if is_duration and values.ndim == 1 and values.size > 1 and bool((np.diff(np.asarray(values)) > 0).all()):
+        if is_duration and values.ndim == 1 and values.size > 1 and _increases(values):
             found.append(name)
     return found
 
@@ -168,13 +171,21 @@ class FileRecording(Mapping[str, Channel]):
             raise ValueError(
                 f"a sample rate needs a channel of times; {self._source} has {had}; give sample_rate= where it is needed"
             )
-        period = float(time[-1] - time[0]) / (time.size - 1)
-        grid = time[0] + period * np.arange(time.size)
-        if not (period > 0 and np.abs(time - grid).max() <= _JITTER * period):
+        try:
+            period = arguments.sample_period(time.size, t=time)
+            for values in self._channels.values():
+                if values.shape == time.shape and not _increases(values):
+                    arguments.check_no_lost_samples(time, values)
+        except arguments.NotUniformError as error:
+            lost = next((part for part in str(error).split("; ") if part.startswith("samples are lost")), "")
             raise ValueError(
-                f"a sample rate needs times that are uniform to a thousandth of their step; those of {self._source} are not; pass t= "
-                f"where times are taken, or resample"
-            )
+                f"a sample rate needs times that are uniform to a thousandth of their step; those of {self._source} are not"
+                f"{lost and ': ' + lost}; pass t= where times are taken, or resample"
+            ) from None
+        except ValueError as error:
+            raise ValueError(
+                f"a sample rate needs times that tell it; those of {self._source} do not: {error}"
+            ) from None
         # Times with few digits give a rate with many.
         rate = 1 / period
         return float(round(rate)) if abs(rate - round(rate)) < 1e-6 * rate else rate

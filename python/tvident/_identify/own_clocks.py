@@ -181,7 +181,7 @@ def own_clocks(
         torque, of_torque = _without_empty_rows(torque, of_torque)
     if name == "delta":
         of_angle, of_torque = (1 / arguments.positive_number("delta", each) for each in (of_angle, of_torque))
-    clocks = two_clocks(of_angle, of_torque, (angle.size, torque.size), time_unit)
+    clocks = two_clocks(of_angle, of_torque, (angle, torque), time_unit)
     return OwnClocks(clocks, (angle, torque), align, propagate)
 
 
