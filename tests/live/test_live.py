@@ -220,10 +220,46 @@ def test_what_cannot_be_read_is_missing_and_said() -> None:
     assert "2 lines could not be read" in words
 
 
+def test_a_mark_of_the_alphabet_hides_no_sample_and_no_name() -> None:
+    """The first sample was taken for a header, and `t` not found."""
+    rows = "".join(f"{a!r},{b!r}\n" for a, b in zip(RIG.angle[:50].tolist(), RIG.torque[:50].tolist(), strict=True))
+    for header, (one, other) in (("", ("0", "1")), ("angle,torque\n", ("angle", "torque"))):
+        found, words = run(f"\ufeff{header}{rows}", "--angle", one, "--torque", other, "--sample-rate", "1000")
+        assert len(found) == 50
+        assert "could not be read" not in words
+
+
+def test_numbers_that_python_alone_reads_are_missing() -> None:
+    found, words = run(
+        "0.1,0.2\n1_000,0.3\n" + "0.1,0.2\n" * 20, "--angle", "0", "--torque", "1", "--sample-rate", "1000"
+    )
+    assert len(found) == 22
+    assert "1 lines could not be read" in words
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        (
+            "angle,torque\n1,2\n".encode("utf-16"),
+            "lines must be UTF-8; they hold the character NUL, as UTF-16 does; write them",
+        ),
+        (b'"1"\r2,"3"\n4,5\n', "quotes must close within a line of CSV; got"),
+    ],
+)
+def test_lines_of_another_alphabet_are_refused_with_the_cure(lines: bytes, words: str) -> None:
+    command = [sys.executable, "-m", "tvident", "live", "--angle", "0", "--torque", "1", "--sample-rate", "1000"]
+    done = subprocess.run(command, input=lines, capture_output=True, check=False, timeout=120)
+    assert done.returncode == 2
+    assert words in done.stderr.decode()
+    assert "universal-newline" not in done.stderr.decode()
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
         (["--sample-rate", "1000", "--method", "auto"], "whole record"),
+        (["--sample-rate", "1000", "--exponent", "5"], "got a WeakForm in a stream"),
         ([], "needs its sample rate"),
         (["--sample-rate", "1000", "--time", "9"], "there are"),
     ],

@@ -73,6 +73,11 @@ class Lines:
             return []
         block = os.read(self._descriptor, _BLOCK)
         self._has_ended = not block
+        if not self._is_begun and not self._early and b"\0" in block:
+            raise ValueError(
+                "lines must be UTF-8; they hold the character NUL, as UTF-16 does; write them as UTF-8, in PowerShell by "
+                "$OutputEncoding = [Text.Encoding]::UTF8"
+            )
         *lines, self._rest = (self._rest + block).split(b"\n")
         if self._has_ended and self._rest:
             lines, self._rest = [self._rest], b""
@@ -80,7 +85,8 @@ class Lines:
             raise ValueError(
                 f"a line must hold at most {_LONGEST} bytes; got more without an end; separate samples by newlines"
             )
-        return [line.decode("utf-8", "replace").strip() for line in lines]
+        # A mark of the alphabet may stand before the first.
+        return [line.decode("utf-8", "replace").strip().removeprefix("\ufeff") for line in lines]
 
     def _has_begun(self) -> bool:
         """Take the first lines, if they have come: how lines are read, and units in a header or below it; the rest are numbers."""
@@ -142,15 +148,17 @@ def _split(line: str, separator: str | None) -> list[str]:
         return [cell.strip() for cell in line.split(separator)]
     try:
         cells = next(csv.reader([line], delimiter=separator or " ", skipinitialspace=True))
-    except csv.Error as error:
+    except csv.Error:
         raise ValueError(
-            f"quotes must close within a line of CSV; got {line[:80]!r} ({error}); write numbers without quotes"
+            f"quotes must close within a line of CSV; got {line[:80]!r}; write numbers without quotes"
         ) from None
     return [cell.strip() for cell in cells]
 
 
 def _number(cell: str) -> float:
     """Return the number in a cell, NaN where it is empty; a comma is a decimal sign, since it separated nothing."""
+    if "_" in cell:  # which Python reads over
+        raise ValueError
     return float(cell.replace(",", ".")) if cell else math.nan
 
 

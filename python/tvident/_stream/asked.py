@@ -160,9 +160,10 @@ def asked_of(
     request, period = requested(given.method, given.equation, given.settings, 1 / given.period), given.period
     is_weak = isinstance(request.form, WeakForm)
     if is_weak and given.frozen is None:
+        got = f"method={given.method!r}" if isinstance(given.method, str) else "a WeakForm"
         raise ValueError(
-            f"the weak form chooses from the whole record; got method={arguments.shown(given.method)} in a stream without settings to "
-            f"go by; {_CURE}, with method='auto', or a method of the strong form: 'paper' or a StrongForm"
+            f"the weak form chooses from the whole record; got {got} in a stream without settings to go by; {_CURE}, with method='auto', "
+            "or a method of the strong form: 'paper' or a StrongForm"
         )
     if not is_weak and given.nan_policy == "omit":
         raise ValueError(
