@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+import tvident
+from tvident import recordings
 from tvident._in_pieces import row_groups
 from tvident._in_pieces.row_groups import ParquetColumn, ParquetRows
 
@@ -78,3 +81,26 @@ def test_a_short_column_is_decoded_once_and_not_copied(tmp_path: Path, monkeypat
     assert decoded == ["angle"]
     assert np.array_equal(all_of_it, values)
     assert np.shares_memory(later, all_of_it)
+
+
+def test_a_damaged_number_in_parquet_is_found(tmp_path: Path) -> None:
+    """A byte of a page was another number, without a word: pages had no checksums, and nobody looked at them."""
+    pytest.importorskip("pyarrow")
+    rig = tvident.simulate_torsional_rig(duration=2.0)
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=1000, stiffness="constant")
+    rig.save(tmp_path / "rig.parquet")
+    result.save(tmp_path / "result.parquet")
+    call: dict[str, Any] = {"angle": "angle", "torque": "torque", "sample_rate": 1000, "stiffness": "constant"}
+    tvident.identify_file(tmp_path / "rig.parquet", tmp_path / "out.parquet", **call)
+    for name, values in (("rig", rig.angle), ("result", result.status), ("out", rig.time)):
+        path = tmp_path / f"{name}.parquet"
+        content = bytearray(path.read_bytes())
+        place = content.find(np.ascontiguousarray(values)[5:8].tobytes())
+        place = place if place > 0 else 200  # packed: any byte of the first column
+        content[place] ^= 1
+        path.write_bytes(content)
+        read = tvident.load if name == "result" else recordings.read
+        with pytest.raises(recordings.FileError, match=r"must be whole; .*; copy it again"):
+            read(path)
+    with pytest.raises(recordings.FileError, match=r"must be whole; pyarrow says: .*; copy it again"):
+        tvident.identify_file(tmp_path / "rig.parquet", tmp_path / "again.npy", **call)

@@ -21,7 +21,7 @@ def read_arrow(path: Path, say: Say) -> Channels:
         raise FileError("Parquet and Arrow files need pyarrow; install it with: pip install 'tvident[io]'") from None
     try:
         if path.suffix.lower() == ".parquet":
-            table = parquet.read_table(path)
+            table = parquet.read_table(path, page_checksum_verification=True)
         else:
             with pa.memory_map(str(path)) as file:
                 try:

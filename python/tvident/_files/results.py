@@ -53,7 +53,7 @@ def write_result(path: Path, arrays: Arrays, units: Mapping[str, str], facts: st
         )
     table = arrow.table({name: np.ascontiguousarray(values) for name, values in named.items()})
     with replaced(path) as file:
-        parquet.write_table(table.replace_schema_metadata({_KEY: facts.encode()}), file)
+        parquet.write_table(table.replace_schema_metadata({_KEY: facts.encode()}), file, write_page_checksum=True)
 
 
 def read_result(path: Path) -> tuple[dict[str, npt.NDArray[Any]], str]:
@@ -103,7 +103,7 @@ def _from_npz(path: Path) -> tuple[dict[str, npt.NDArray[Any]], str]:
 
 def _from_parquet(path: Path) -> tuple[dict[str, npt.NDArray[Any]], str]:
     _, parquet = _parquet()
-    table = parquet.read_table(path)
+    table = parquet.read_table(path, page_checksum_verification=True)
     facts = (table.schema.metadata or {}).get(_KEY, b"").decode()
     return {name: table.column(name).to_numpy() for name in table.column_names}, facts
 

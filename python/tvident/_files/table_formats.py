@@ -62,7 +62,7 @@ def write_parquet(file: IO[bytes], columns: Columns, units: Mapping[str, str]) -
         pa.field(name, array.type, metadata={b"unit": units[name].encode()} if units.get(name) else None)
         for name, array in zip(columns, arrays, strict=True)
     ]
-    parquet.write_table(pa.table(arrays, schema=pa.schema(fields)), file)
+    parquet.write_table(pa.table(arrays, schema=pa.schema(fields)), file, write_page_checksum=True)
 
 
 def write_hdf5(file: IO[bytes], columns: Columns, units: Mapping[str, str]) -> None:

@@ -109,7 +109,7 @@ def _parquet(file: IO[bytes], table: OutputTable) -> Iterator[Put]:
     schema = pa.schema(fields, {_KEY.encode(): table.facts.encode()})
     # Dictionaries, compression and statistics cost more than all the rest, and numbers with noise have no use for them.
     with parquet.ParquetWriter(
-        file, schema, compression="NONE", use_dictionary=False, write_statistics=["time"]
+        file, schema, compression="NONE", use_dictionary=False, write_statistics=["time"], write_page_checksum=True
     ) as writer:
 
         def put(columns: Columns) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -44,11 +44,11 @@ class ParquetRows:
             ) from None
         try:
             # Read-ahead would hold whole row groups.
-            self._file = parquet.ParquetFile(self.path, pre_buffer=False, memory_map=False, buffer_size=_BUFFER)
+            self._file = parquet.ParquetFile(
+                self.path, pre_buffer=False, memory_map=False, buffer_size=_BUFFER, page_checksum_verification=True
+            )
         except (ArrowException, OSError) as error:
-            raise FileError(
-                f"{printable(self.path)}: must be whole; pyarrow says: {printable(error, 200)}; copy it again"
-            ) from None
+            raise self._damaged(error) from None
         groups = [self._file.metadata.row_group(place).num_rows for place in range(self._file.num_row_groups)]
         self._first = np.concatenate([[0], np.cumsum(groups, dtype=np.int64)]).tolist()
         self.samples = self._first[-1]
@@ -74,18 +74,32 @@ class ParquetRows:
         group = self._group_of(first)
         place, groups = self._first[group], range(group, self._file.num_row_groups)
         # One column has nothing for several threads to do.
-        for batch in self._file.iter_batches(_BATCH, groups, [name], use_threads=False):
+        batches = self._file.iter_batches(_BATCH, groups, [name], use_threads=False)
+        while (batch := self._decoded(lambda: next(batches, None))) is not None:
             yield place, np.asarray(batch.column(0).to_numpy(zero_copy_only=False))
             place += batch.num_rows
 
     def whole(self, name: str) -> npt.NDArray[Any]:
         """Return all samples of a column, where the decoder put them."""
-        column = self._file.read_row_groups(range(self._file.num_row_groups), [name], use_threads=False).column(0)
+        groups = range(self._file.num_row_groups)
+        column = self._decoded(lambda: self._file.read_row_groups(groups, [name], use_threads=False)).column(0)
         parts = [np.asarray(part.to_numpy(zero_copy_only=False)) for part in column.chunks]
         return np.concatenate(parts) if len(parts) != 1 else parts[0]
 
     def close(self) -> None:
         self._file.close()
+
+    def _decoded(self, read: Callable[[], Any]) -> Any:
+        """Return what is read, unless it is damaged, as checksums of pages tell where a file has them."""
+        from pyarrow import ArrowException  # noqa: PLC0415 - an extra
+
+        try:
+            return read()
+        except (ArrowException, OSError) as error:
+            raise self._damaged(error) from None
+
+    def _damaged(self, error: Exception) -> FileError:
+        return FileError(f"{printable(self.path)}: must be whole; pyarrow says: {printable(error, 200)}; copy it again")
 
     def _group_of(self, sample: int) -> int:
         return int(np.searchsorted(self._first, sample, side="right")) - 1
