@@ -71,6 +71,13 @@ RESULT = tvident.identify(ANGLE, TORQUE, sample_rate=1000, lag="auto").settings
         RESULT | {"lag_samples": 3},
         RESULT | {"terms": [1]},
         RESULT | {"own_terms": 1},
+        RESULT | {"width_from": 5},
+        RESULT | {"windows_near": -1},
+        RESULT | {"windows_near": 10**30},
+        RESULT | {"windows_near": [1.5]},
+        RESULT | {"shown_noise": 0},
+        RESULT | {"needed": True},
+        RESULT | {"needed": {"cubic": "x"}},
     ]
     + [
         {name: value for name, value in RESULT.items() if name != left}

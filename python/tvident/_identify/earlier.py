@@ -55,6 +55,10 @@ _BESIDE_FORM = frozenset(
 """What settings of results hold beside those of their form."""
 
 
+_COUNTABLE = 1 << 53
+"""More samples than any record has."""
+
+
 def kept(earlier: Mapping[str, Any], given: Mapping[str, Any], *, has_form: bool) -> Sequence[str]:
     """Return what an earlier result chose that neither an argument nor a form replaces."""
     return [name for name in earlier["chosen"] if (name not in given if name == "lag" else not has_form)]
@@ -172,7 +176,11 @@ def _is_whole(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Mappi
         and all(isinstance(kinds[name], str) and (kinds[name] != "known" or name in known) for name in COEFFICIENTS)
         and all(one.name in earlier for one in fields(form))
         and isinstance(earlier["method"], str)
+        and all(isinstance(earlier.get(name), list | tuple | None) for name in ("lag_samples", "shown_noise"))
         and all(_is_finite(one) for name in ("lag_samples", "shown_noise") for one in earlier.get(name) or ())
+        and all(one is None or isinstance(one, str) for one in of_each(earlier, "width_from"))
+        and all(one is None or _is_count(one) for one in of_each(earlier, "windows_near"))
+        and all(isinstance(one, bool | list | tuple) for one in dict(earlier.get("needed") or {}).values())
         and all(_is_finite(one) for one in angle_zero(earlier) or ())
         and all(
             all(map(_is_finite, one)) if isinstance(one, list | tuple) else _is_finite(one)
@@ -183,6 +191,10 @@ def _is_whole(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Mappi
 
 def _is_finite(number: object) -> bool:
     return isinstance(number, int | float) and math.isfinite(number)
+
+
+def _is_count(number: object) -> bool:
+    return isinstance(number, int) and 0 <= number < _COUNTABLE
 
 
 def with_earlier_kinds(terms: Sequence[Any], earlier: Mapping[str, Any]) -> Sequence[Any]:
