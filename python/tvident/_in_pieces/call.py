@@ -14,7 +14,7 @@ from tvident import _arguments as arguments
 from tvident import _core
 from tvident._choices import VERSION
 from tvident._equation import GivenTerm
-from tvident._files import check_apart, ending_of, full_name, is_time
+from tvident._files import FileError, check_apart, ending_of, full_name, is_time
 from tvident._identify import Method
 from tvident._in_pieces.copied import copied
 from tvident._in_pieces.found import FileIdentification
@@ -149,6 +149,11 @@ def identify_file(
     every = arguments.whole_number("step", step, least=1)
     threads = arguments.worker_count(workers)
     arguments.one_of("nan_policy", nan_policy, ("omit", "propagate", "raise"))
+    _check_named({"angle": angle, "torque": torque}, {"t": t, "weights": weights}, settings)
+    delta, sample_rate = (
+        None if one is None else arguments.positive_number(name, one)
+        for name, one in (("delta", delta), ("sample_rate", sample_rate))
+    )
     given = {
         "inertia": inertia,
         "damping": damping,
@@ -188,10 +193,28 @@ def identify_file(
             call = Given(method, given, settings, nan_policy, recording.period, recording.axis, threads, weighted)
             asked = AskedOfFile(recording, call, every)
             return Run(asked, kept, LONG_PIECE if asked.is_narrow else PIECE, place, report).all()
-        except BaseException:
-            if kept.is_empty:
+        except BaseException as error:
+            # The copy of a text is of use to the same call alone, which such an error would end again.
+            if kept.is_empty or (isinstance(error, _WRONG) and not kept.has_results):
                 kept.remove()
             raise
+
+
+def _check_named(names: Mapping[str, object], others: Mapping[str, object], settings: Mapping[str, Any] | None) -> None:
+    """Check, before anything is copied, that channels are named and settings are some."""
+    for what, name in (*names.items(), *((what, name) for what, name in others.items() if name is not None)):
+        if not isinstance(name, str):
+            raise TypeError(
+                f"{what} must be the name of a channel; got {arguments.shown(name)}; write 'angle', or its number '0', say"
+            )
+    if settings is not None and not isinstance(settings, Mapping):
+        raise TypeError(
+            f"settings must be those of an earlier result; got {arguments.shown(settings)}; pass result.settings"
+        )
+
+
+_WRONG = (FileError, ValueError, TypeError, KeyError)
+"""What a file or a call has that another call must put right."""
 
 
 def _opened(path: Path, output: Path, told: Mapping[str, Any], of_text: str | None) -> tuple[Source, Kept]:
@@ -200,7 +223,9 @@ def _opened(path: Path, output: Path, told: Mapping[str, Any], of_text: str | No
         kept = Kept(output, told)
         try:
             return copied(path, kept.folder, of_text), kept
-        except BaseException:
+        except BaseException as error:
+            if isinstance(error, _WRONG):
+                kept.remove()
             kept.close()
             raise
     return opened(path), Kept(output, told)

@@ -105,7 +105,12 @@ class Kept:
     def is_empty(self) -> bool:
         """Whether nothing is kept that would be missed."""
         holds = {one.name for one in self.folder.iterdir()} - {LOCK, "state.json"}
-        return not self._found["notes"] and not self._found["facts"] and not holds
+        return not self.has_results and not holds
+
+    @property
+    def has_results(self) -> bool:
+        """Whether rows or facts of the record are kept."""
+        return bool(self._found["notes"] or self._found["facts"])
 
     @property
     def count(self) -> int:

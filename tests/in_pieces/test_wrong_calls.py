@@ -1,0 +1,61 @@
+"""Wrong calls of ``identify_file`` say what would be right before anything is copied, and leave nothing behind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import tvident
+from tvident import recordings
+
+CALL: dict[str, Any] = {"angle": "angle", "torque": "torque", "sample_rate": 1000, "stiffness": "constant"}
+
+
+@pytest.fixture(autouse=True)
+def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    tvident.simulate_torsional_rig(duration=2.0).save("rig.csv")
+
+
+def left() -> list[str]:
+    return sorted(one.name for one in Path().iterdir() if one.name != "rig.csv")
+
+
+@pytest.mark.parametrize(
+    ("changed", "error", "message"),
+    [
+        ({"angle": None}, TypeError, "angle must be the name of a channel; got None; write 'angle', or its number"),
+        ({"torque": 2}, TypeError, "torque must be the name of a channel; got 2; write 'angle', or its number"),
+        ({"weights": [1.0]}, TypeError, r"weights must be the name of a channel; got \[1.0\]; "),
+        ({"settings": 5}, TypeError, "settings must be those of an earlier result; got 5; pass result.settings"),
+        ({"settings": [1]}, TypeError, r"settings must be those of an earlier result; got \[1\]; "),
+        ({"sample_rate": b"1000"}, TypeError, "sample_rate must be a number; got b'1000'; "),
+        ({"torque": "nope"}, KeyError, "has no channel 'nope'"),
+        ({"torque_unit": "deg"}, ValueError, "the torque must be in a unit that can be converted to N m"),
+        ({"stiffness": "x"}, ValueError, "must be"),
+    ],
+)
+def test_a_wrong_call_leaves_nothing(changed: dict[str, Any], error: type[Exception], message: str) -> None:
+    """Words of Python, and beside the result a copy of the text that no other call could use, in a folder of a hidden name."""
+    with pytest.raises(error, match=message):
+        tvident.identify_file("rig.csv", "out.npy", **{**CALL, **changed})
+    assert left() == []
+
+
+def test_a_text_that_cannot_be_read_leaves_nothing() -> None:
+    with Path("rig.csv").open("a") as file:
+        file.write("2.0,0.1\n")
+    with pytest.raises(recordings.FileError, match="every line must have 7 cells"):
+        tvident.identify_file("rig.csv", "out.npy", **CALL)
+    assert left() == []
+
+
+@pytest.mark.parametrize("rate", [np.float32(1000), np.int64(1000)])
+def test_a_sample_rate_may_be_a_number_of_numpy(rate: Any) -> None:
+    """It ended in "Object of type float32 is not JSON serializable"."""
+    found = tvident.identify_file("rig.csv", "out.npy", **{**CALL, "sample_rate": rate})
+    assert found.samples == 2000
+    assert left() == ["out.npy"]
