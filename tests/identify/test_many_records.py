@@ -150,11 +150,13 @@ def test_records_within_records_are_refused_in_words() -> None:
     rig = tvident.simulate_torsional_rig(duration=1.0)
     angle, torque = rig.angle, rig.torque
     options: dict[str, Any] = {"sample_rate": 1000, "share": "inertia", "stiffness": "constant"}
-    ragged = [[one, one[:700]] for one in (angle, torque)]
+    ragged: list[Any] = [[one, one[:700]] for one in (angle, torque)]
+    within: Any = [1.0, [2.0]]
+    nothing: Any = None
     with pytest.raises(ValueError, match=r"angle\[0\] must be a regular array .*; .* one list of them"):
         tvident.identify(*([one, one] for one in ragged), **options)
     with pytest.raises(ValueError, match=r"torque\[1\] must be a regular array of numbers; got \[1.0, \[2.0\]\]; "):
-        tvident.identify([angle, angle[:700]], [torque, [1.0, [2.0]]], sample_rate=1000)
+        tvident.identify([angle, angle[:700]], [torque, within], sample_rate=1000)
     for nested in (np.stack([angle, angle]), [angle.tolist()]):
         with pytest.raises(
             ValueError, match=r"must have one dimension .* got angle\[1\] of shape \([12], 1000\); put its"
@@ -163,4 +165,4 @@ def test_records_within_records_are_refused_in_words() -> None:
     with pytest.raises(ValueError, match="share must be 'inertia', 'damping' or 'stiffness'; got 5"):
         tvident.identify([angle, angle], [torque, torque], **{**options, "share": 5})
     with pytest.raises(TypeError, match="torque must hold numbers"):
-        tvident.identify([angle, angle], None, **options)
+        tvident.identify([angle, angle], nothing, **options)

@@ -71,6 +71,8 @@ RESULT = tvident.identify(ANGLE, TORQUE, sample_rate=1000, lag="auto").settings
         RESULT | {"lag_samples": 3},
         RESULT | {"terms": [1]},
         RESULT | {"own_terms": 1},
+        np.float64(3),
+        np.zeros((2, 2)),
         RESULT | {"width_from": 5},
         RESULT | {"windows_near": -1},
         RESULT | {"windows_near": 10**30},

@@ -111,6 +111,10 @@ class FileRecording(Mapping[str, Channel]):
     def __init__(
         self, channels: Mapping[str, npt.ArrayLike], *, sample_rate: float | None = None, source: str = "the recording"
     ) -> None:
+        if not isinstance(channels, Mapping):
+            raise TypeError(
+                f"channels must be a mapping of names to samples; got {arguments.shown(channels)}; write {{'angle [deg]': samples}}, say"
+            )
         full = {str(name): np.asarray(values) for name, values in channels.items()}
         bare = [named_unit(name)[0] for name in full]
         self._channels: dict[str, Channel] = {}

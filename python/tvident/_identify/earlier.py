@@ -104,6 +104,8 @@ def form_of_result(earlier: Mapping[str, Any]) -> tuple[str, Form, dict[str, Seq
 def arguments_of_result(earlier: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the arguments beside the form that an earlier result's settings stand for."""
     try:
+        if not isinstance(earlier, Mapping):
+            raise TypeError  # noqa: TRY301 - as anything that is no settings
         kinds, known = dict(earlier["kinds"]), dict(earlier["known"])
         terms = [(str(name), str(kind)) for name, kind in earlier["terms"]]
         asked = {name: earlier[name] for name in ("lag", "quantisation")}

@@ -22,7 +22,9 @@ _SETTLED = 0.02
 
 def loss_of(given: LossAsked | None, settings: Mapping[str, Any] | None) -> LossAsked:
     """Return the loss that was given, that of an earlier result, or that of least squares."""
-    word = arguments.one_of("loss", given or (settings or {}).get("loss") or "squares", get_args(LossAsked))
+    word = arguments.one_of(
+        "loss", (settings or {}).get("loss") or "squares" if given is None else given, get_args(LossAsked)
+    )
     return cast("LossAsked", word)
 
 

@@ -180,7 +180,16 @@ class Matrix:
     def __post_init__(self) -> None:
         arguments.one_of("shape", self.shape, ("full", "symmetric", "diagonal"))
         kind_or_number("kind", self.kind)
-        groups = [tuple((int(row), int(column)) for row, column in group) for group in self.tied]
+        try:
+            groups = [tuple((int(row), int(column)) for row, column in group) for group in self.tied]
+        except (TypeError, ValueError):
+            raise TypeError(
+                f"tied must be groups of entries; got {arguments.shown(self.tied)}; write [[(0, 0), (1, 1)]], say"
+            ) from None
+        if not isinstance(self.entries, Mapping):
+            raise TypeError(
+                f"entries must be a mapping of places to kinds or numbers; got {arguments.shown(self.entries)}; write {{(0, 1): 0.0}}, say"
+            )
         # Of a symmetric matrix an entry and its mirror image are one, and a group may name both.
         each = [entry for group in groups for entry in dict.fromkeys(map(self._one_of, group))]
         if len(each) != len(set(each)):
@@ -267,6 +276,10 @@ def matrices(given: Mapping[str, Any], masses: int) -> list[Element]:
 def _links(name: str, links: Sequence[Link], masses: int) -> tuple[Link, ...]:
     """Return pairs of masses, checked."""
     found: list[Link] = []
+    if not isinstance(links, Sized) or isinstance(links, str | bytes):
+        raise TypeError(
+            f"{name} must be a list of pairs; got {arguments.shown(links)}; write [('base', 0), (0, 1)], say"
+        )
     for link in links:
         if isinstance(link, str) or not isinstance(link, Sized) or len(link) != _LEAST_PAIR:
             raise ValueError(

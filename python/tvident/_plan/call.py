@@ -234,6 +234,10 @@ def _duration(each: npt.NDArray[np.float64], rate: float, window: float | None, 
 
 def _longer(result: Identification, wanted: float, more: float) -> ExperimentPlan:
     """Return what more of the same would bring: constants know of all of it, windows of their own seconds only."""
+    if not isinstance(result, Identification):
+        raise TypeError(
+            f"result must be what identify returns for one record; got {arguments.shown(result)}; leave it out, or identify first"
+        )
     if result.inertia.ndim != 1:
         raise ValueError(f"a plan is for one record; got shape {result.inertia.shape}; take one of them")
     seconds = result.time.size * result.settings["step"] / result.settings["sample_rate"]

@@ -49,6 +49,12 @@ def write_page(
     ValueError
         If a channel does not have a value for every sample.
     """
+    if not isinstance(channels, Mapping | None):
+        raise TypeError(
+            f"channels must be a mapping of names to samples; got {arguments.shown(channels)}; write {{'force [N]': samples}}, say"
+        )
+    if not isinstance(title, str | None):
+        raise TypeError(f"title must be text; got {arguments.shown(title)}; write it in quotes")
     result, drawn = page.result, list(recorded)
     step, samples = int(result.settings["step"]), max((one.values.size for one in recorded), default=None)
     for name, values in (channels or {}).items():

@@ -71,6 +71,6 @@ def known_name(name: str, known: Iterable[str]) -> str:
         If there is none.
     """
     names = list(known)
-    if name not in names:
+    if not isinstance(name, str) or name not in names:
         raise KeyError(f"there is no {name!r}; there are {', '.join(names)}")
     return name

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _arguments as arguments
 from tvident._results.estimates import Estimates
 from tvident._results.measured import Measured, known_name, number_of
 from tvident._tables import Tabular
@@ -70,7 +71,10 @@ class Valued(Tabular):
         """
         if self.inertia.ndim > 1 and record is None:
             raise ValueError(f"a value is of one record; got {self._records} of them; give record=0, say")
-        return self._values(record or 0)[known_name(name, self._values(record or 0))]
+        if record is not None and not -self._records <= arguments.whole_number("record", record) < self._records:
+            raise ValueError(f"record must be less than the {self._records} records; got {record}; count from 0")
+        values = self._values(record or 0)
+        return values[known_name(name, values)]
 
     @property
     def _records(self) -> int:

@@ -154,7 +154,9 @@ class LocalPolynomialStream(SampleStream[StreamedDerivatives]):
             "derivatives": tuple(range(highest + 1)),
             "delta": period,
             "noise": True,
-            "quantisation": 0.0 if not quantisation else arguments.positive_number("quantisation", quantisation),
+            "quantisation": 0.0
+            if quantisation is None or (np.ndim(quantisation) == 0 and not quantisation)
+            else arguments.positive_number("quantisation", quantisation),
         }
         self._step = arguments.whole_number("step", step, least=1)
         self._stderr = arguments.flag("stderr", stderr)
