@@ -91,6 +91,17 @@ pub(crate) struct Outputs<'a> {
 }
 
 impl Outputs<'_> {
+    /// Some of the elements, such as those of one of several records.
+    pub(crate) fn part(&mut self, elements: Range<usize>) -> Outputs<'_> {
+        let values = self.values.iter_mut();
+        Outputs {
+            elements: self.elements,
+            values: values.map(|values| values.get_mut(elements.clone()).unwrap_or_default()).collect(),
+            order: self.order.get_mut(elements.clone()).unwrap_or_default(),
+            status: self.status.get_mut(elements).unwrap_or_default(),
+        }
+    }
+
     /// Makes some samples NaN, with a status.
     pub(crate) fn invalidate(&mut self, samples: Range<usize>, status: Status) {
         let elements = self.elements.of(samples);

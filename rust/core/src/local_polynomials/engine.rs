@@ -4,7 +4,8 @@
 //! middle, at `g S + S/2`, or at the record's last window where that comes first. Blocks are one span, or several short ones, and are
 //! worked on in runs, as many side by side as there are lanes. Which spans share a run does not matter, since lanes keep apart, so
 //! any cutting of a record gives the same bits. Short records are side by side instead, one in each lane, which is one block of many
-//! spans (`side_by_side.rs`). Where few windows are wanted, each is projected on its own (`apart.rs`).
+//! spans (`side_by_side.rs`). Where few windows are wanted, each is projected on its own (`apart.rs`), and short ones of a fixed order are
+//! sums of their samples (`short_windows.rs`).
 
 use std::fmt::Debug;
 use std::ops::Range;
@@ -20,6 +21,8 @@ use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::estimates::Estimates;
 use crate::local_polynomials::evaluate::{Finish, Functional};
 use crate::local_polynomials::kernels::{Direction, Fill, STEPS, Start, Sweep, replace, states};
+use crate::local_polynomials::mirrored_kernels::MirroredScratch;
+use crate::local_polynomials::short_windows::ShortWindows;
 use crate::local_polynomials::side_by_side::SideBySide;
 use crate::local_polynomials::sliding_projection::{Projection, SHORTEST_BLOCK};
 use crate::record::buffer::Stretch;
@@ -91,6 +94,7 @@ pub(crate) fn engine(
 pub(crate) struct Engine<const D: usize, const RESIDUAL: bool> {
     projection: Projection<D>,
     finish: Finish,
+    short: Option<ShortWindows>,
     instructions: Instructions,
 }
 
@@ -102,6 +106,7 @@ pub(crate) struct EngineScratch {
     states: States,
     /// For windows that are projected one by one.
     apart: Option<ApartScratch>,
+    short: MirroredScratch,
 }
 
 /// What the kernels of a run hand on to one another.
@@ -119,7 +124,8 @@ struct States {
 
 impl<const D: usize, const RESIDUAL: bool> Engine<D, RESIDUAL> {
     fn new(basis: &Basis, finish: Finish, instructions: Instructions, watch: &mut Watch<'_>) -> Result<Self, Error> {
-        Ok(Self { projection: Projection::watched(basis, watch)?, finish, instructions })
+        let short = if RESIDUAL { None } else { ShortWindows::new(basis, &finish, instructions) };
+        Ok(Self { projection: Projection::watched(basis, watch)?, finish, short, instructions })
     }
 
     /// Whether every `step`-th window is projected on its own.
@@ -178,6 +184,7 @@ impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
                 tile: Tile::new(self.finish.fields(RESIDUAL), TILE, lanes),
             },
             apart: None,
+            short: MirroredScratch::default(),
         }
     }
 
@@ -196,10 +203,14 @@ impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
         let moved = if in_span < backward { last - in_span } else { last + 1 };
         let mut outputs = outputs::<RESIDUAL>(estimates);
         if self.apart(outputs.elements.step) {
-            let Self { projection, finish, instructions } = self;
+            let Self { projection, finish, instructions, .. } = self;
             let apart =
                 Apart::<D, RESIDUAL> { projection, finish, instructions: *instructions, step: outputs.elements.step };
             apart.walk(record, windows, &mut outputs, &mut scratch.apart);
+            return;
+        }
+        if let Some(short) = self.short.as_ref().filter(|short| short.serve(&outputs, D)) {
+            short.write(record, windows, &mut outputs, &mut scratch.short);
             return;
         }
         // What a run reads, and how much of it is not read again by the next.
@@ -245,22 +256,31 @@ impl<const D: usize, const RESIDUAL: bool> Walk for Engine<D, RESIDUAL> {
     ) {
         let (count, samples) = (records.count(), records.samples());
         let windows = 0..samples - self.projection.length() + 1;
-        let run = EngineRun {
-            engine: self,
-            stretch: records.stretch(),
-            strips: records.strips(),
-            base: 0,
-            block: samples,
-            latest: windows.end - 1,
-            windows: windows.clone(),
-            records: Some(Records { count, elements }),
-        };
-        run.work(&mut scratch.states, &mut outputs::<RESIDUAL>(estimates));
+        let mut all = outputs::<RESIDUAL>(estimates);
+        if let Some(short) = self.short.as_ref().filter(|short| short.serve(&all, D)) {
+            for record in 0..count {
+                let own = records.stretch().from((record * samples).cast_signed(), samples);
+                let mut outputs = all.part(record * elements..(record + 1) * elements);
+                short.write(&own, windows.clone(), &mut outputs, &mut scratch.short);
+            }
+        } else {
+            let run = EngineRun {
+                engine: self,
+                stretch: records.stretch(),
+                strips: records.strips(),
+                base: 0,
+                block: samples,
+                latest: windows.end - 1,
+                windows: windows.clone(),
+                records: Some(Records { count, elements }),
+            };
+            run.work(&mut scratch.states, &mut all);
+        }
         for record in 0..count {
             let mut unusable = records.unusable(record, 0..samples).peekable();
             if unusable.peek().is_some() {
-                let mut own = estimates.part(record * elements..(record + 1) * elements);
-                self.invalidate(unusable, &windows, &mut outputs::<RESIDUAL>(&mut own));
+                let mut own = all.part(record * elements..(record + 1) * elements);
+                self.invalidate(unusable, &windows, &mut own);
             }
         }
     }
@@ -296,7 +316,7 @@ impl<const D: usize, const RESIDUAL: bool> EngineRun<'_, D, RESIDUAL> {
     ///
     /// The kernels are called one by one, not from one another: in one function they would spill each other's registers.
     fn work(&self, states: &mut States, outputs: &mut Outputs<'_>) {
-        let Engine { projection, finish, instructions } = self.engine;
+        let Engine { projection, finish, instructions, .. } = self.engine;
         let (instructions, span, strips, wanted) = (*instructions, projection.span(), self.strips, self.rows());
         let States { references, start: at_start, state, stepped: states, tile } = states;
         // Short spans are written whole, as many together as a tile holds; long ones tile by tile.

@@ -3,6 +3,7 @@
 use crate::lanes::tile::Tile;
 use crate::local_polynomials::basis::{Basis, MOST_DEGREES};
 use crate::local_polynomials::criterion::{Tables, choose};
+use crate::local_polynomials::mirrored_kernels::MirroredKernel;
 use crate::local_polynomials::options::{Order, PolynomialOptions};
 use crate::local_polynomials::order_average::Akaike;
 use crate::local_polynomials::sliding_projection::State;
@@ -45,6 +46,12 @@ impl Functional {
         let values = basis.evaluate(0.0, derivative);
         let weights = std::array::from_fn(|j| values.get(j).map_or(0.0, |value| value * scale));
         Self { weights, odd: derivative % 2 == 1, constant: f64::from(u8::from(derivative == 0)) }
+    }
+
+    /// The same as a kernel over the samples of an odd window.
+    pub(crate) fn kernel(&self, basis: &Basis) -> MirroredKernel {
+        let of = |row: &[f64]| self.weights.iter().zip(row).map(|(weight, value)| weight * value).sum();
+        MirroredKernel { odd: self.odd, constant: self.constant, outwards: basis.rows().skip(1).map(of).collect() }
     }
 
     /// Its value's standard deviation over that of the noise, for every order.

@@ -254,7 +254,8 @@ impl PairSum<'_, '_> {
                 });
             }
             for (sums, &row) in sums.iter().zip(&group.rows) {
-                let row = &mut rows[row][some.start + first..some.end];
+                // A row that is not wanted is empty.
+                let Some(row) = rows[row].get_mut(some.start + first..some.end) else { continue };
                 for (part, &sum) in row.chunks_mut(lanes).zip(sums) {
                     if part.len() == lanes {
                         simd.store(part, 0, sum);

@@ -21,6 +21,7 @@ pub(crate) mod order_shares;
 pub(crate) mod pieces;
 pub(crate) mod plan;
 pub(crate) mod records;
+pub(crate) mod short_windows;
 pub(crate) mod side_by_side;
 pub(crate) mod single_window;
 pub(crate) mod sliding_projection;
