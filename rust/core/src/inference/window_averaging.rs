@@ -13,9 +13,10 @@ use crate::exec::stages::Stages;
 use crate::inference::moving::moving;
 use crate::inference::over_record::{ErrorSums, OverRecord};
 use crate::inference::weighted_windows::WeightedWindows;
-use crate::inference::windows_around::{Around, WindowAtRow};
+use crate::inference::windows_around::Around;
 use crate::regression::constants::Expected;
 use crate::regression::problem::Problem;
+use crate::regression::sides::Sides;
 use crate::regression::subsample::holds;
 use crate::regression::window_length::{Cells, Scale};
 use crate::simd::instructions::Instructions;
@@ -69,8 +70,8 @@ const POSITIONS: usize = 3;
 /// A length of windows and its error over the record.
 struct Candidate {
     scale: Scale,
-    /// All cells, if they are few.
-    cells: Option<Cells>,
+    /// All cells, if they are few, and which of their windows are solved.
+    cells: Option<(Cells, Sides)>,
     /// Mean squared error over the record, by position; infinite if the length is not used there.
     record: [OverRecord; POSITIONS],
 }
@@ -79,6 +80,17 @@ impl Candidate {
     /// Whether it may serve in a position: in rows of the least weight or in those of the greatest.
     fn promises(&self, which: usize, hopeless: &[(f64, f64)]) -> bool {
         hopeless.iter().any(|&(weight, most)| self.record[which].at(weight) <= most)
+    }
+
+    /// The windows of the positions that promise something, or of those that do not.
+    fn sides(&self, hope: bool, hopeless: &[(f64, f64)]) -> Sides {
+        let [before, around, after] = [0, 1, 2].map(|which| self.promises(which, hopeless) == hope);
+        Sides { one: (before || after) && self.scale.stands_alone(), both: around }
+    }
+
+    /// The windows that rows can be judged by.
+    fn judging(&self) -> Sides {
+        Sides { one: self.scale.stands_alone(), both: true }
     }
 }
 
@@ -128,8 +140,9 @@ pub(crate) fn average(
     for candidate in &mut candidates {
         let chosen = (0..POSITIONS).any(|which| candidate.promises(which, &hopeless));
         if chosen && candidate.scale.step >= COARSE && candidate.cells.is_none() {
-            let all = candidate.scale.one_sided_cells(rows);
-            candidate.cells = Some(candidate.scale.solve(problem, &all, instructions, stages)?);
+            let (all, sides) = (candidate.scale.one_sided_cells(rows), candidate.sides(true, &hopeless));
+            let cells = candidate.scale.solve(problem, (&all, sides), instructions, stages)?;
+            candidate.cells = Some((cells, sides));
         }
     }
 
@@ -154,10 +167,16 @@ fn ends_of_weights(problem: &Problem<'_>) -> [f64; 2] {
     if least <= greatest { [least, greatest] } else { [1.0; 2] }
 }
 
+/// Windows ready to predict, and on which sides of a row.
+type Ready<'a> = (Around<'a>, Sides);
+
 /// Windows of the candidates whose cells are all solved, ready to predict in every piece.
-fn ready(candidates: &[Candidate]) -> Vec<Option<Around<'_>>> {
-    let all = candidates.iter();
-    all.map(|candidate| Some(Around::new(candidate.scale, candidate.cells.as_ref()?, &[]))).collect()
+fn ready(candidates: &[Candidate]) -> Vec<Option<Ready<'_>>> {
+    let ready = candidates.iter().map(|candidate| {
+        let (cells, sides) = candidate.cells.as_ref()?;
+        Some((Around::new(candidate.scale, cells, &[]), *sides))
+    });
+    ready.collect()
 }
 
 /// Rows on either side of a row over which its errors are averaged, and the number of independent rows among them.
@@ -187,11 +206,13 @@ impl View<'_, '_> {
         let mut solved = Vec::new();
         for candidate in &*candidates {
             let (scale, all) = (candidate.scale, candidate.scale.one_sided_cells(self.problem.rows()));
+            let sides = candidate.judging();
             let cells = if scale.step >= COARSE {
-                Some(scale.solve(self.problem, &all, self.instructions, stages)?)
+                Some(scale.solve(self.problem, (&all, sides), self.instructions, stages)?)
             } else {
-                kept.as_ref().map(|kept| self.cells(candidate, kept))
+                kept.as_ref().map(|kept| self.cells(candidate, (kept, sides)))
             };
+            let cells = cells.map(|cells| (cells, sides));
             solved.push(Candidate { scale, cells, record: candidate.record });
         }
         let ready = ready(&solved);
@@ -199,8 +220,7 @@ impl View<'_, '_> {
         let work = |piece: Range<usize>, (): &mut ()| {
             let counted = piece.start.max(rows.start)..piece.end.min(rows.end);
             let both = solved.iter().zip(&ready);
-            both.map(|(candidate, ready)| self.sums(candidate, ready.as_ref(), (counted.clone(), &moving)))
-                .collect::<Vec<_>>()
+            both.map(|(candidate, ready)| self.sums(candidate, ready.as_ref(), (&counted, &moving))).collect::<Vec<_>>()
         };
         let sums = stages.map(ranges(self.problem.rows()), || (), work)?;
         for (index, candidate) in candidates.iter_mut().enumerate() {
@@ -228,46 +248,45 @@ impl View<'_, '_> {
     }
 
     /// The cells of a candidate around some rows.
-    fn cells(&self, candidate: &Candidate, rows: &Range<usize>) -> Cells {
+    fn cells(&self, candidate: &Candidate, (rows, sides): (&Range<usize>, Sides)) -> Cells {
         let scale = candidate.scale;
         let all = scale.one_sided_cells(self.problem.rows());
         let wanted = scale.cell(rows.start).max(all.start)..(scale.cell(rows.end.max(1) - 1) + 1).min(all.end);
         let wanted = wanted.start..wanted.end.max(wanted.start);
-        scale.solve_here(self.problem, &wanted, self.instructions)
+        scale.solve_here(self.problem, (&wanted, sides), self.instructions)
     }
 
-    /// Squared error of a row, over the noise's variance.
-    fn error(&self, window: &WindowAtRow<'_, '_>, row: usize) -> f64 {
-        let error = self.problem.rhs[row] - window.predict(self.problem, row);
-        (error * error / self.variance).min(MOST)
+    /// What is left of a row squared, over the noise's variance.
+    fn squared(&self, left: f64) -> f64 {
+        (left * left / self.variance).min(MOST)
     }
 
     /// Sums over rows, and over those of them that move, by position.
     fn sums(
         &self,
         candidate: &Candidate,
-        ready: Option<&Around<'_>>,
-        (rows, moving): (Range<usize>, &[bool]),
+        ready: Option<&Ready<'_>>,
+        (rows, moving): (&Range<usize>, &[bool]),
     ) -> [[ErrorSums; 2]; POSITIONS] {
         let mut sums = [[ErrorSums::default(); 2]; POSITIONS];
         if rows.start >= rows.end {
             return sums;
         }
         let (cells, here);
-        let around = if let Some(ready) = ready {
+        let around = if let Some((ready, _)) = ready {
             ready
         } else {
-            cells = self.cells(candidate, &rows);
+            cells = self.cells(candidate, (rows, candidate.judging()));
             here = Around::new(candidate.scale, &cells, &[]);
             &here
         };
-        for row in rows.filter(|&row| self.problem.usable[row]) {
-            for (which, sums) in sums.iter_mut().enumerate() {
-                if let Some(window) = around.at_row(self.problem, row, which) {
-                    let (error, weight) = (self.error(&window, row), self.problem.weight(row));
+        for (which, sums) in sums.iter_mut().enumerate() {
+            around.errors(self.problem, rows, which, |row, left| {
+                if self.problem.usable[row] {
+                    let (error, weight) = (self.squared(left), self.problem.weight(row));
                     sums.iter_mut().take(1 + usize::from(moving[row])).for_each(|sums| sums.add(error, weight));
                 }
-            }
+            });
         }
         sums
     }
@@ -275,7 +294,7 @@ impl View<'_, '_> {
     /// Averages all candidates at some rows.
     fn average(
         &self,
-        (candidates, ready): (&[Candidate], &[Option<Around<'_>>]),
+        (candidates, ready): (&[Candidate], &[Option<Ready<'_>>]),
         rows: Range<usize>,
         nearby: Nearby,
         record: f64,
@@ -284,9 +303,8 @@ impl View<'_, '_> {
     ) {
         let (windowed, total) = (self.problem.layout.windowed, self.problem.rows());
         let wide = rows.start.saturating_sub(nearby.rows)..(rows.end + nearby.rows).min(total);
-        let (width, numbers) = (rows.len(), 3 * windowed);
-        let mut weighted = WeightedWindows::new(width, windowed);
-        let mut numbers_here = vec![0.0; numbers];
+        let mut weighted = WeightedWindows::new(rows.len(), windowed);
+        let mut errors = vec![[0.0, 0.0]; wide.len() + 1];
         // Rows that no promising window reaches, near an end or a gap, use the others.
         for hope in [true, false] {
             let wanted: Vec<bool> = weighted.are_missing().map(|missing| hope || missing).collect();
@@ -296,52 +314,49 @@ impl View<'_, '_> {
             let chosen =
                 |candidate: &Candidate| (0..POSITIONS).any(|which| candidate.promises(which, hopeless) == hope);
             for (candidate, ready) in candidates.iter().zip(ready).filter(|(candidate, _)| chosen(candidate)) {
+                let sides = candidate.sides(hope, hopeless);
                 let (cells, here);
-                let around = if let Some(ready) = ready {
+                let around = if let Some((ready, _)) = ready.as_ref().filter(|(_, solved)| solved.hold(sides)) {
                     ready
                 } else {
-                    cells = self.cells(candidate, &wide);
+                    cells = self.cells(candidate, (&wide, sides));
                     here = Around::new(candidate.scale, &cells, &[]);
                     &here
                 };
                 for which in (0..POSITIONS).filter(|&which| candidate.promises(which, hopeless) == hope) {
-                    // Running sums of the errors, so that every mean costs two differences; they restart with every piece.
-                    let mut errors = vec![[0.0, 0.0]; wide.len() + 1];
-                    for (place, row) in wide.clone().enumerate() {
-                        let mut next = errors[place];
-                        if self.problem.usable[row]
-                            && let Some(window) = around.at_row(self.problem, row, which)
-                        {
-                            next = [next[0] + self.error(&window, row), next[1] + 1.0];
+                    self.running_errors(around, &wide, which, &mut errors);
+                    around.numbers(self.problem, &rows, which, |row, numbers| {
+                        let place = row - rows.start;
+                        if !wanted[place] {
+                            return;
                         }
-                        errors[place + 1] = next;
-                    }
-                    for (place, row) in rows.clone().enumerate().filter(|(place, _)| wanted[*place]) {
-                        let Some(window) = around.at_row(self.problem, row, which) else { continue };
                         let first = row.saturating_sub(nearby.rows).max(wide.start) - wide.start;
                         let last = (row + nearby.rows + 1).min(wide.end) - wide.start;
                         let (sum, count) = (errors[last][0] - errors[first][0], errors[last][1] - errors[first][1]);
                         // Within a gap there are no errors nearby, and those over the record decide.
                         let here = if count == 0.0 { 0.0 } else { nearby.independent * sum / count };
                         let expected = candidate.record[which].at(self.problem.weight(row)).min(MOST);
-                        let exponent = 0.5 * (here + record * expected);
-                        self.numbers_at_row(&window, &mut numbers_here);
-                        weighted.add(place, exponent, &numbers_here);
-                    }
+                        weighted.add(place, 0.5 * (here + record * expected), numbers);
+                    });
                 }
             }
         }
         weighted.into_means(columns);
     }
 
-    /// The values, slopes and standard errors of a window at a row.
-    fn numbers_at_row(&self, window: &WindowAtRow<'_, '_>, numbers: &mut [f64]) {
-        let windowed = self.problem.layout.windowed;
-        for unknown in 0..windowed {
-            numbers[unknown] = window.value(unknown);
-            numbers[windowed + unknown] = window.slope(unknown);
-            numbers[2 * windowed + unknown] = window.variance(unknown).max(0.0).sqrt();
-        }
+    /// Running sums of the errors of some rows and of their number, so that every mean costs two differences; they restart with every piece.
+    fn running_errors(&self, around: &Around<'_>, rows: &Range<usize>, which: usize, errors: &mut [[f64; 2]]) {
+        let (mut sum, mut filled) = ([0.0, 0.0], 1);
+        around.errors(self.problem, rows, which, |row, left| {
+            if self.problem.usable[row] {
+                let place = row - rows.start + 1;
+                errors[filled..place].fill(sum);
+                sum = [sum[0] + self.squared(left), sum[1] + 1.0];
+                errors[place] = sum;
+                filled = place + 1;
+            }
+        });
+        errors[filled..].fill(sum);
     }
 }
 

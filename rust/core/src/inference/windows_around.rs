@@ -1,6 +1,8 @@
 //! Windows before, around and after a row: they predict the row without containing it, and give the coefficients there.
 
-use crate::regression::predictor::Predictor;
+use std::ops::Range;
+
+use crate::regression::predictor::{Predictor, UnknownInWindow};
 use crate::regression::problem::Problem;
 use crate::regression::window_length::{Cells, Scale};
 
@@ -30,38 +32,111 @@ impl<'a> Around<'a> {
 
     /// The window before (0), around (1) or after (2) a row, or `None` if it does not exist or a jump lies between.
     pub(crate) fn at_row(&self, problem: &Problem<'_>, row: usize, which: usize) -> Option<WindowAtRow<'a, '_>> {
-        let cell = self.scale.cell(row);
-        let later = |centre: f64| (row as f64 - centre) * problem.period;
+        let WindowOfCell { candidate, reference, place, reference_place, .. } =
+            self.of_cell(self.scale.cell(row), which)?;
+        let later = self.later(problem, self.scale.cell(row), row, which)?;
+        Some(WindowAtRow { candidate, reference, place, reference_place, later })
+    }
+
+    /// Gives what the windows at some rows leave of these, by row, where there are such windows.
+    pub(crate) fn errors(
+        &self,
+        problem: &Problem<'_>,
+        rows: &Range<usize>,
+        which: usize,
+        mut give: impl FnMut(usize, f64),
+    ) {
+        let mut tracks = vec![UnknownInWindow::default(); problem.layout.windowed];
+        for cell in self.cells(rows) {
+            let Some(window) = self.of_cell(cell, which) else { continue };
+            window.candidate.lines(window.place, &mut tracks);
+            for row in self.rows_of(cell, rows) {
+                if let Some(later) = self.later(problem, cell, row, which) {
+                    give(row, problem.rhs[row] - UnknownInWindow::predict(&tracks, problem, row, later));
+                }
+            }
+        }
+    }
+
+    /// Gives the values, the slopes and the standard errors of the windows at some rows, by row, where there are such windows.
+    pub(crate) fn numbers(
+        &self,
+        problem: &Problem<'_>,
+        rows: &Range<usize>,
+        which: usize,
+        mut give: impl FnMut(usize, &[f64]),
+    ) {
+        let windowed = problem.layout.windowed;
+        let (mut tracks, mut numbers) = (vec![UnknownInWindow::default(); windowed], vec![0.0; 3 * windowed]);
+        for cell in self.cells(rows) {
+            let Some(window) = self.of_cell(cell, which) else { continue };
+            window.reference.tracks(window.reference_place, &mut tracks);
+            for row in self.rows_of(cell, rows) {
+                let Some(later) = self.later(problem, cell, row, which) else { continue };
+                for (unknown, track) in tracks.iter().enumerate() {
+                    numbers[unknown] = track.value(later);
+                    numbers[windowed + unknown] = track.slope();
+                    numbers[2 * windowed + unknown] = track.variance(later).max(0.0).sqrt();
+                }
+                give(row, &numbers);
+            }
+        }
+    }
+
+    /// The cells of some rows.
+    fn cells(&self, rows: &Range<usize>) -> Range<isize> {
+        if rows.is_empty() { 0..0 } else { self.scale.cell(rows.start)..self.scale.cell(rows.end - 1) + 1 }
+    }
+
+    /// Those of some rows that belong to a cell.
+    fn rows_of(&self, cell: isize, rows: &Range<usize>) -> Range<usize> {
+        let own = self.scale.rows_of_cell(cell);
+        own.start.max(rows.start)..own.end.min(rows.end)
+    }
+
+    /// The window of the rows of a cell.
+    fn of_cell(&self, cell: isize, which: usize) -> Option<WindowOfCell<'a, '_>> {
         if which == 1 {
             let (place, reference_place) = (self.leave_gap_out.place(cell)?, self.full.place(cell)?);
-            let later = later(self.scale.centres(cell)[1]);
-            return Some(WindowAtRow {
-                candidate: &self.leave_gap_out,
-                reference: &self.full,
-                place,
-                reference_place,
-                later,
-            });
+            let (candidate, reference) = (&self.leave_gap_out, &self.full);
+            return Some(WindowOfCell { candidate, reference, place, reference_place });
         }
         if !self.scale.stands_alone() {
             return None;
         }
-        let cell = if which == 0 { cell } else { self.scale.after(cell) };
-        let place = self.one_sided.place(cell)?;
-        let rows = self.scale.one_sided_rows(cell);
-        let between = if which == 0 { rows.end - 1..row.cast_signed() } else { row.cast_signed()..rows.start };
-        if problem.jumps_within(&between) {
-            return None;
-        }
-        let later = later(self.scale.centres(cell)[0]);
-        Some(WindowAtRow {
-            candidate: &self.one_sided,
-            reference: &self.one_sided,
-            place,
-            reference_place: place,
-            later,
-        })
+        let place = self.one_sided.place(self.one_sided_cell(cell, which))?;
+        Some(WindowOfCell { candidate: &self.one_sided, reference: &self.one_sided, place, reference_place: place })
     }
+
+    /// The number of the one-sided window before or after the rows of a cell.
+    fn one_sided_cell(&self, cell: isize, which: usize) -> isize {
+        if which == 0 { cell } else { self.scale.after(cell) }
+    }
+
+    /// The time of a row of a cell after the centre of its window, or `None` if a jump lies between.
+    fn later(&self, problem: &Problem<'_>, cell: isize, row: usize, which: usize) -> Option<f64> {
+        let later = |centre: f64| (row as f64 - centre) * problem.period;
+        if which == 1 {
+            return Some(later(self.scale.centres(cell)[1]));
+        }
+        let cell = self.one_sided_cell(cell, which);
+        if !problem.jumps.is_empty() {
+            let (rows, row) = (self.scale.one_sided_rows(cell), row.cast_signed());
+            let between = if which == 0 { rows.end - 1..row } else { row..rows.start };
+            if problem.jumps_within(&between) {
+                return None;
+            }
+        }
+        Some(later(self.scale.centres(cell)[0]))
+    }
+}
+
+/// The window of the rows of a cell: the candidate and the reference, and where they stand.
+struct WindowOfCell<'a, 'b> {
+    candidate: &'b Predictor<'a>,
+    reference: &'b Predictor<'a>,
+    place: usize,
+    reference_place: usize,
 }
 
 impl WindowAtRow<'_, '_> {
@@ -106,7 +181,9 @@ mod tests {
         let problem = model().problem(&rows, &rows.rhs, 0.0, None);
         let scale = *Scale::all(ROWS, 3).iter().find(|scale| scale.stands_alone()).expect("a length");
         let all = scale.one_sided_cells(ROWS);
-        let cells = staged(|stages| scale.solve(&problem, &all, Instructions::Scalar, stages));
+        let cells = staged(|stages| {
+            scale.solve(&problem, (&all, crate::regression::sides::Sides::ALL), Instructions::Scalar, stages)
+        });
         let around = Around::new(scale, &cells, &CONSTANTS);
         [0, 1, 2].map(|which| {
             let window = around.at_row(&problem, ROW, which)?;

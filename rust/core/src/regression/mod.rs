@@ -20,6 +20,7 @@ pub(crate) mod residuals;
 pub(crate) mod row_covariance;
 pub(crate) mod row_neighbours;
 pub(crate) mod sandwich;
+pub(crate) mod sides;
 #[cfg(test)]
 pub(crate) mod simulated;
 pub(crate) mod solve;

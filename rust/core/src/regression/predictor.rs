@@ -61,15 +61,80 @@ impl<'a> Predictor<'a> {
 
     /// The contribution of the windowed unknowns to a row's right-hand side.
     pub(crate) fn predict(&self, problem: &Problem<'_>, place: usize, row: usize, later: f64) -> f64 {
-        let layout = problem.layout;
         let mut sum = 0.0;
-        for windowed in 0..layout.windowed {
-            sum += self.value(place, windowed, later) * problem.windowed[windowed][row];
-            if layout.linear {
-                sum += self.values[layout.windowed + windowed][place] * problem.companions[windowed][row];
-            }
+        for windowed in 0..problem.layout.windowed {
+            sum = self.line(place, windowed).add_to(sum, problem, (windowed, row), later);
         }
         sum
+    }
+
+    /// A windowed unknown without its variances.
+    fn line(&self, place: usize, windowed: usize) -> UnknownInWindow {
+        let layout = self.solved.fields.layout;
+        let slope = if layout.linear { self.values[layout.windowed + windowed][place] } else { 0.0 };
+        UnknownInWindow { value: self.values[windowed][place], slope, variances: [0.0; 3] }
+    }
+
+    /// All windowed unknowns without their variances.
+    pub(crate) fn lines(&self, place: usize, tracks: &mut [UnknownInWindow]) {
+        for (windowed, track) in tracks.iter_mut().enumerate() {
+            *track = self.line(place, windowed);
+        }
+    }
+
+    /// All windowed unknowns.
+    pub(crate) fn tracks(&self, place: usize, tracks: &mut [UnknownInWindow]) {
+        let (fields, layout) = (self.solved.fields, self.solved.fields.layout);
+        let entry = |i, j| self.solved.field(fields.covariance(i, j))[place];
+        for (windowed, track) in tracks.iter_mut().enumerate() {
+            *track = self.line(place, windowed);
+            track.variances[0] = entry(windowed, windowed);
+            if layout.linear {
+                let slope = layout.windowed + windowed;
+                track.variances = [track.variances[0], entry(windowed, slope), entry(slope, slope)];
+            }
+        }
+    }
+}
+
+/// A windowed unknown in a window: its value at the centre, its growth per second, and the variances of both, with what they share between.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct UnknownInWindow {
+    value: f64,
+    slope: f64,
+    variances: [f64; 3],
+}
+
+impl UnknownInWindow {
+    /// Its value at a time after the window's centre.
+    pub(crate) fn value(&self, later: f64) -> f64 {
+        self.value + later * self.slope
+    }
+
+    /// Its growth per second, as its values show it.
+    pub(crate) fn slope(&self) -> f64 {
+        self.value(1.0) - self.value(0.0)
+    }
+
+    /// The variance of its value then.
+    pub(crate) fn variance(&self, later: f64) -> f64 {
+        let [own, shared, of_slope] = self.variances;
+        own + (2.0 * later * shared + later * later * of_slope)
+    }
+
+    /// What all windowed unknowns contribute to a row's right-hand side.
+    pub(crate) fn predict(tracks: &[Self], problem: &Problem<'_>, row: usize, later: f64) -> f64 {
+        let mut sum = 0.0;
+        for (windowed, track) in tracks.iter().enumerate() {
+            sum = track.add_to(sum, problem, (windowed, row), later);
+        }
+        sum
+    }
+
+    /// Adds what one contributes.
+    fn add_to(&self, sum: f64, problem: &Problem<'_>, (windowed, row): (usize, usize), later: f64) -> f64 {
+        let sum = sum + self.value(later) * problem.windowed[windowed][row];
+        if problem.layout.linear { sum + self.slope * problem.companions[windowed][row] } else { sum }
     }
 }
 

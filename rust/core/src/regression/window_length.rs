@@ -12,6 +12,7 @@ use crate::exec::stages::Stages;
 use crate::regression::dyadic_windows::{WindowShape, solve_windows};
 use crate::regression::layout::Layout;
 use crate::regression::problem::Problem;
+use crate::regression::sides::Sides;
 use crate::regression::solved::{Solved, fewest_rows};
 use crate::simd::instructions::Instructions;
 
@@ -46,7 +47,7 @@ pub(crate) struct Scale {
     pub(crate) reach: usize,
 }
 
-/// The windows of consecutive cells.
+/// The windows of consecutive cells; there are none of those that were not to be solved.
 #[derive(Clone, Debug)]
 pub(crate) struct Cells {
     /// One-sided windows: that of cell `g` lies before its rows. They reach beyond the cells, so that the windows after the last cells
@@ -120,6 +121,12 @@ impl Scale {
         (row.cast_signed() - self.first_row()).div_euclid(self.step.cast_signed())
     }
 
+    /// The rows that belong to a cell; there are none before the record.
+    pub(crate) fn rows_of_cell(self, cell: isize) -> Range<usize> {
+        let row = |cell: isize| (self.first_row() + cell * self.step.cast_signed()).max(0).unsigned_abs();
+        row(cell)..row(cell + 1)
+    }
+
     /// The first row of cell 0.
     fn first_row(self) -> isize {
         let slack = (self.gap * self.step + 2 - 2 * self.reach - self.step) / 2;
@@ -163,21 +170,22 @@ impl Scale {
     pub(crate) fn solve(
         self,
         problem: &Problem<'_>,
-        cells: &Range<isize>,
+        (cells, sides): (&Range<isize>, Sides),
         instructions: Instructions,
         stages: &mut Stages<'_, '_>,
     ) -> Result<Cells, Error> {
         let shapes = self.shapes();
         let mut pieces = Vec::new();
-        let end = self.after(cells.end);
+        let end = if sides.one { self.after(cells.end) } else { cells.end };
         let mut first = cells.start;
         while first < end {
             let next = (first + PIECE.cast_signed()).min(end);
             pieces.push(Piece { size: (next - first).unsigned_abs() * self.step, content: first..next });
             first = next;
         }
-        let work = |blocks: Range<isize>, (): &mut ()| self.part(problem, &shapes, cells, &blocks, instructions);
-        Ok(join(&stages.map(pieces, || (), work)?))
+        let work =
+            |blocks: Range<isize>, (): &mut ()| self.part(problem, &shapes, (cells, sides), &blocks, instructions);
+        Ok(join(stages.map(pieces, || (), work)?, problem.layout))
     }
 
     /// Solves the full windows only, in parallel.
@@ -218,8 +226,14 @@ impl Scale {
     }
 
     /// Solves the windows of some cells on this thread.
-    pub(crate) fn solve_here(self, problem: &Problem<'_>, cells: &Range<isize>, instructions: Instructions) -> Cells {
-        join(&[self.part(problem, &self.shapes(), cells, &(cells.start..self.after(cells.end)), instructions)])
+    pub(crate) fn solve_here(
+        self,
+        problem: &Problem<'_>,
+        (cells, sides): (&Range<isize>, Sides),
+        instructions: Instructions,
+    ) -> Cells {
+        let blocks = cells.start..if sides.one { self.after(cells.end) } else { cells.end };
+        join(vec![self.part(problem, &self.shapes(), (cells, sides), &blocks, instructions)], problem.layout)
     }
 
     /// The shapes of a cell's windows: one-sided, with the gap left out, and full.
@@ -234,18 +248,24 @@ impl Scale {
     fn part(
         self,
         problem: &Problem<'_>,
-        shapes: &[WindowShape],
-        cells: &Range<isize>,
+        shapes: &[WindowShape; 3],
+        (cells, sides): (&Range<isize>, Sides),
         blocks: &Range<isize>,
         instructions: Instructions,
     ) -> Vec<Solved> {
+        let wanted = &shapes[usize::from(!sides.one)..if sides.both { 3 } else { 1 }];
         let whole = blocks.start..blocks.end.min(cells.end).max(blocks.start);
         let rest = whole.end..blocks.end;
-        let mut solved = solve_windows(problem, self.step, &whole, shapes, instructions);
-        if !rest.is_empty() {
-            let one_sided = solve_windows(problem, self.step, &rest, &shapes[..1], instructions);
-            solved[0] = Solved::join(&[&solved[0], &one_sided[0]]);
+        let mut solved = solve_windows(problem, self.step, &whole, wanted, instructions);
+        if sides.one && !rest.is_empty() {
+            let mut one_sided = solve_windows(problem, self.step, &rest, &shapes[..1], instructions);
+            solved[0] =
+                if whole.is_empty() { one_sided.swap_remove(0) } else { Solved::join(&[&solved[0], &one_sided[0]]) };
         }
+        let nothing = || Solved::new(problem.layout, blocks.start, 0);
+        let missing = usize::from(!sides.one);
+        solved.splice(0..0, std::iter::repeat_with(nothing).take(missing));
+        solved.resize_with(shapes.len(), nothing);
         solved
     }
 }
@@ -273,12 +293,13 @@ fn solve_shapes(
 }
 
 /// Joins the parts of each shape.
-fn join(parts: &[Vec<Solved>]) -> Cells {
-    Cells { one_sided: join_shape(parts, 0), leave_gap_out: join_shape(parts, 1), full: join_shape(parts, 2) }
-}
-
-fn join_shape(parts: &[Vec<Solved>], shape: usize) -> Solved {
-    Solved::join(&of_shape(parts, shape))
+fn join(mut parts: Vec<Vec<Solved>>, layout: Layout) -> Cells {
+    let mut of = |shape: usize| match &mut parts[..] {
+        [] => Solved::new(layout, 0, 0),
+        [part] => std::mem::replace(&mut part[shape], Solved::new(layout, 0, 0)),
+        parts => Solved::join(&of_shape(parts, shape)),
+    };
+    Cells { one_sided: of(0), leave_gap_out: of(1), full: of(2) }
 }
 
 fn of_shape(parts: &[Vec<Solved>], shape: usize) -> Vec<&Solved> {
@@ -373,12 +394,15 @@ mod tests {
         let problem = model().problem(&rows, &rows.rhs, 0.0, None);
         for scale in Scale::all(900, 6) {
             let all = scale.one_sided_cells(900);
-            let whole = staged(|stages| scale.solve(&problem, &all, Instructions::Scalar, stages));
+            let whole = staged(|stages| scale.solve(&problem, (&all, Sides::ALL), Instructions::Scalar, stages));
             let some = 5.min(all.end - 1)..9.min(all.end);
-            let part = scale.solve_here(&problem, &some, Instructions::Scalar);
+            let here = |one, both| scale.solve_here(&problem, (&some, Sides { one, both }), Instructions::Scalar);
+            let (beside, part) = (here(true, false), here(false, true));
+            assert_eq!([beside.leave_gap_out.len(), beside.full.len(), part.one_sided.len()], [0; 3]);
+            let part = Cells { one_sided: beside.one_sided, ..part };
             let alone = staged(|stages| Scale::solve_leave_gap_out(&[scale], &problem, Instructions::Scalar, stages));
             let [gap, full] = &alone[0];
-            for cell in some {
+            for cell in some.clone() {
                 let pairs = [
                     (&whole.one_sided, &part.one_sided),
                     (&whole.leave_gap_out, &part.leave_gap_out),
@@ -399,6 +423,7 @@ mod tests {
             }
         }
     }
+
     #[test]
     fn lengths_of_one_step_are_the_same_together_and_alone() {
         let rows = rows(900, |time| [time.sin(), time.cos()], 0.1);

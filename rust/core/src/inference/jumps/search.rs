@@ -22,6 +22,7 @@ use crate::inference::jumps::jump::{Jump, JumpSearch, Lines, UNLIKELY};
 use crate::inference::jumps::placement::JumpPlace;
 use crate::inference::jumps::shared_windows::SharedWindows;
 use crate::inference::windows_around::Around;
+use crate::regression::sides::Sides;
 use crate::regression::window_length::{Cells, SHORTEST_ALONE, Scale};
 
 /// Squared difference between the windows before and after a row, over its variance, above which a jump is searched.
@@ -117,14 +118,14 @@ impl JumpSearch<'_> {
         found
     }
 
-    /// Windows of every length around some rows.
+    /// Windows of every length before and after some rows.
     fn solve<'s>(&self, rows: &Range<usize>, shared: &'s SharedWindows<'_>) -> Vec<(Scale, Cow<'s, Cells>)> {
         let solve = |&scale: &Scale| {
             let all = scale.one_sided_cells(self.problem.rows());
             let reach = self.function.len() / self.stride * self.group;
             let first = scale.cell(rows.start.saturating_sub(reach)).max(all.start).min(all.end);
             let end = (scale.cell(rows.end + reach) + 1).min(all.end).max(first);
-            (scale, shared.of(scale, &(first..end)))
+            (scale, shared.of(scale, &(first..end), Sides { one: true, both: false }))
         };
         self.lengths.iter().map(solve).collect()
     }
@@ -225,7 +226,7 @@ impl JumpSearch<'_> {
         if cells.is_empty() {
             return None;
         }
-        let cells = shared.of(scale, &cells);
+        let cells = shared.of(scale, &cells, Sides { one: false, both: true });
         let windows = Around::new(scale, &cells, &[]);
         let error = |&row: &usize| {
             let window = windows.at_row(self.problem, row, 1)?;

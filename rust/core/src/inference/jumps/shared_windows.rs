@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 use crate::regression::problem::Problem;
+use crate::regression::sides::Sides;
 use crate::regression::window_length::{Cells, Scale};
 use crate::simd::instructions::Instructions;
 
@@ -24,18 +25,20 @@ impl<'a> SharedWindows<'a> {
         Self { problem, instructions, places, whole }
     }
 
-    /// Windows of one length, of some cells at least. A window has the same bits either way.
-    pub(crate) fn of(&self, scale: Scale, cells: &Range<isize>) -> Cow<'_, Cells> {
+    /// Windows of one length, of some cells at least, on some sides at least. A window has the same bits either way.
+    pub(crate) fn of(&self, scale: Scale, cells: &Range<isize>, sides: Sides) -> Cow<'_, Cells> {
         let rows = self.problem.rows();
         let shared = self.whole.iter().find(|(other, _)| *other == scale);
         match shared.filter(|_| self.places.saturating_mul(scale.span()) > rows) {
-            Some((_, whole)) => Cow::Borrowed(whole.get_or_init(|| self.solve(scale, &scale.one_sided_cells(rows)))),
-            None => Cow::Owned(self.solve(scale, cells)),
+            Some((_, whole)) => {
+                Cow::Borrowed(whole.get_or_init(|| self.solve(scale, &scale.one_sided_cells(rows), Sides::ALL)))
+            }
+            None => Cow::Owned(self.solve(scale, cells, sides)),
         }
     }
 
-    fn solve(&self, scale: Scale, cells: &Range<isize>) -> Cells {
-        scale.solve_here(self.problem, cells, self.instructions)
+    fn solve(&self, scale: Scale, cells: &Range<isize>, sides: Sides) -> Cells {
+        scale.solve_here(self.problem, (cells, sides), self.instructions)
     }
 }
 
@@ -54,7 +57,7 @@ mod tests {
         for &scale in &scales {
             let all = scale.one_sided_cells(400);
             let cells = all.start + all.end / 3..all.start + all.end / 2;
-            let (some, whole) = (alone.of(scale, &cells), shared.of(scale, &cells));
+            let (some, whole) = (alone.of(scale, &cells, Sides::ALL), shared.of(scale, &cells, Sides::ALL));
             assert!(matches!(some, Cow::Owned(_)) && matches!(whole, Cow::Borrowed(_)));
             let pairs = [
                 (&some.one_sided, &whole.one_sided),
