@@ -9,7 +9,7 @@
 use std::ops::Range;
 
 use crate::equation::rows::Rows;
-use crate::regression::block_products::{Eliminated, Products, ROWS_OF_AN_UNKNOWN, dot, inverse};
+use crate::regression::block_products::{Eliminated, NoiseOfPairs, Products, ROWS_OF_AN_UNKNOWN, dot, inverse};
 use crate::regression::block_scatter::Finer;
 use crate::regression::model::Model;
 
@@ -78,8 +78,9 @@ pub(crate) fn fit_in_blocks(
     let lags = (2 * reach).div_ceil(length.max(1)).min(blocks.len().saturating_sub(1));
     let fit = |&noise: &f64| {
         let (mut used, mut unknowns) = (0.0, constants);
+        let mut entering = NoiseOfPairs::default();
         let part = |(block, moments): (&Range<usize>, &(Vec<f64>, [f64; 3]))| {
-            let part = products.of_constants(block, moments, noise, &scale)?;
+            let part = products.of_constants(block, moments, (noise, &mut entering), &scale)?;
             (used, unknowns) = (used + moments.1[0], unknowns + first);
             Some(part)
         };
@@ -132,9 +133,10 @@ impl Parts {
         let moments: Vec<_> = blocks.iter().map(|block| products.of(block)).collect();
         let scale = products.scale(&moments);
         let (size, first) = (model.constant.len() + 1, 2 * model.windowed.len());
+        let mut entering = NoiseOfPairs::default();
         let part = |(block, moments): (&Range<usize>, &(Vec<f64>, [f64; 3]))| {
             products
-                .of_constants(block, moments, noise, &scale)
+                .of_constants(block, moments, (noise, &mut entering), &scale)
                 .map_or_else(|| vec![0.0; size * size], |part| part.rest)
         };
         let products = blocks.iter().zip(&moments).map(part).collect();

@@ -4,6 +4,9 @@ use std::ops::Range;
 
 use crate::equation::rows::Rows;
 use crate::regression::model::Model;
+use crate::simd::f64x8::{Packet, WIDTH};
+use crate::simd::instructions::Instructions;
+use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
 /// What a pivot must keep of its column's square to be more than rounding.
 const NOTHING: f64 = 1e-10;
@@ -40,6 +43,7 @@ impl Products<'_> {
     }
 
     /// The columns of a row.
+    #[inline(always)]
     fn fill(&self, row: usize, time: f64, half: f64, into: &mut [f64]) {
         let mut place = 0;
         for &index in &self.model.windowed {
@@ -59,23 +63,38 @@ impl Products<'_> {
     pub(crate) fn of(&self, block: &Range<usize>) -> (Vec<f64>, [f64; 3]) {
         let count = self.columns();
         let (mut products, mut times) = (vec![0.0; count * count], [0.0; 3]);
+        if count <= WIDTH {
+            let mut sums = [Packet::ZERO; WIDTH];
+            dispatch(Instructions::current(), FewColumns { products: self, block, sums: &mut sums, times: &mut times });
+            for (i, sum) in sums[..count].iter().enumerate() {
+                products[i * count..=i * count + i].copy_from_slice(&sum.0[..=i]);
+            }
+            return (products, times);
+        }
         self.for_each_row(block, |_, time, values| {
             for i in 0..count {
                 let factor = values[i];
                 products[i * count..=i * count + i].iter_mut().zip(&*values).for_each(|(p, v)| *p += factor * v);
             }
-            times.iter_mut().zip([1.0, time, time * time]).for_each(|(sum, power)| *sum += power);
+            add_powers(time, &mut times);
         });
         (products, times)
     }
 
     /// Products with the columns divided by `scale` and without what the angle's noise adds, above the diagonal too.
-    pub(crate) fn corrected(&self, part: &(Vec<f64>, [f64; 3]), half: f64, noise: f64, scale: &[f64]) -> Vec<f64> {
+    fn corrected(
+        &self,
+        part: &(Vec<f64>, [f64; 3]),
+        half: f64,
+        (noise, entering): (f64, &mut NoiseOfPairs),
+        scale: &[f64],
+    ) -> Vec<f64> {
         let (count, (mut products, times)) = (self.columns(), part.clone());
-        let kernels = if noise > 0.0 { self.kernels(half) } else { Vec::new() };
+        let mut pairs = if noise > 0.0 { entering.of(self, half) } else { &[] }.iter();
         for i in 0..count {
             for j in 0..=i {
-                let added = if noise > 0.0 { noise * expected(&kernels[i], &kernels[j], &times) } else { 0.0 };
+                let added =
+                    pairs.next().map_or(0.0, |pair| noise * pair.iter().zip(&times).map(|(a, b)| a * b).sum::<f64>());
                 let value = (products[i * count + j] - added) / (scale[i] * scale[j]);
                 products[i * count + j] = value;
                 products[j * count + i] = value;
@@ -90,7 +109,7 @@ impl Products<'_> {
         &self,
         block: &Range<usize>,
         moments: &(Vec<f64>, [f64; 3]),
-        noise: f64,
+        noise: (f64, &mut NoiseOfPairs),
         scale: &[f64],
     ) -> Option<Eliminated> {
         let first = 2 * self.model.windowed.len();
@@ -123,10 +142,68 @@ impl Products<'_> {
     }
 }
 
-/// What noise of variance one adds to the product of two columns, for powers of time summed over the rows.
-fn expected(one: &[Vec<f64>; 2], other: &[Vec<f64>; 2], times: &[f64; 3]) -> f64 {
-    let dot = |i: usize, j: usize| -> f64 { one[i].iter().zip(&other[j]).map(|(a, b)| a * b).sum() };
-    times[0] * dot(0, 0) + times[1] * (dot(0, 1) + dot(1, 0)) + times[2] * dot(1, 1)
+/// Sums the products of so few columns that a packet holds a row of them.
+struct FewColumns<'a, 'b> {
+    products: &'a Products<'b>,
+    block: &'a Range<usize>,
+    sums: &'a mut [Packet; WIDTH],
+    times: &'a mut [f64; 3],
+}
+
+impl Kernel for FewColumns<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _simd: S) {
+        let Self { products, block, sums, times } = self;
+        let (half, centre) = products.centre(block);
+        let count = products.columns();
+        let mut values = Packet::ZERO;
+        for row in block.start..block.end {
+            if !products.rows.usable[row] {
+                continue;
+            }
+            let time = (row as f64 - centre) * products.rows.period;
+            products.fill(row, time, half, &mut values.0);
+            for (sum, &factor) in sums[..count].iter_mut().zip(&values.0) {
+                *sum += Packet::splat(factor) * values;
+            }
+            add_powers(time, times);
+        }
+    }
+}
+
+/// Adds the powers of a time to their sums.
+#[inline(always)]
+fn add_powers(time: f64, sums: &mut [f64; 3]) {
+    sums[0] += 1.0;
+    sums[1] += time;
+    sums[2] += time * time;
+}
+
+/// What noise of variance one adds to the products of pairs of columns, times the powers of time summed over the rows. Blocks of one length share it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct NoiseOfPairs {
+    half: f64,
+    pairs: Vec<[f64; 3]>,
+}
+
+impl NoiseOfPairs {
+    fn of(&mut self, products: &Products<'_>, half: f64) -> &[[f64; 3]] {
+        if self.pairs.is_empty() || self.half.to_bits() != half.to_bits() {
+            let kernels = products.kernels(half);
+            self.half = half;
+            self.pairs.clear();
+            for (place, one) in kernels.iter().enumerate() {
+                let entering = |other: &[Vec<f64>; 2]| {
+                    let of = |i: usize, j: usize| dot(&one[i], &other[j]);
+                    [of(0, 0), of(0, 1) + of(1, 0), of(1, 1)]
+                };
+                self.pairs.extend(kernels[..=place].iter().map(entering));
+            }
+        }
+        &self.pairs
+    }
 }
 
 /// What eliminating the first columns of symmetric products leaves.

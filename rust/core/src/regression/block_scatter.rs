@@ -93,6 +93,7 @@ impl Finer<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::regression::block_products::NoiseOfPairs;
     use crate::regression::simulated::{CONSTANTS, model, rows};
 
     #[test]
@@ -106,7 +107,8 @@ mod tests {
         let constants: Vec<f64> = CONSTANTS.iter().map(|one| 0.9 * one).collect();
         let finer = Finer { products: &products, blocks: &blocks, scale: &scale, length: 25 };
         for (block, moments) in blocks.iter().zip(&moments) {
-            let eliminated = products.of_constants(block, moments, 0.01, &scale).unwrap();
+            let eliminated =
+                products.of_constants(block, moments, (0.01, &mut NoiseOfPairs::default()), &scale).unwrap();
             let parts = finer.of_block(block, &eliminated, &constants);
             assert_eq!(parts.len(), block.len() / 25);
             let size = constants.len() + 1;

@@ -23,9 +23,13 @@ impl SpringColumn {
         let determined: Vec<usize> =
             (fit.full.first..).take(fit.full.len()).filter_map(|window| predictor.place(window)).collect();
         let first = *determined.first()?;
-        let nearest = |row: usize| {
+        // The first determined window that is no earlier than the nearest: both move on with the rows.
+        let mut next = 0;
+        let mut nearest = |row: usize| {
             let wanted = fit.nearest(row);
-            let next = determined.partition_point(|&window| window < wanted);
+            while determined.get(next).is_some_and(|&window| window < wanted) {
+                next += 1;
+            }
             let around = [next.checked_sub(1), Some(next)].into_iter().flatten();
             let around = around.filter_map(|place| determined.get(place).copied());
             around.min_by_key(|place| place.abs_diff(wanted)).unwrap_or(first)
