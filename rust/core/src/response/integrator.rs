@@ -12,6 +12,9 @@ const TOLERANCE: f64 = 1e-9;
 /// Halvings of a sample period at most, and what may be wrong then.
 const HALVINGS: u32 = 12;
 const UNSOUND: f64 = 1e-4;
+/// Steps that are halved in a sample period in the mean, and in a few that need more: a system that is faster is too fast for its samples.
+const HALVED: usize = 128;
+const HALVED_AT_ONCE: usize = 1 << 16;
 
 /// Which derivatives of the angle the equation has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,6 +59,8 @@ pub(crate) struct Integrator<'a> {
     /// The largest angle so far, and whether a step could not be made to agree.
     largest: f64,
     failed: bool,
+    /// Steps that may be halved before the next sample.
+    left: usize,
 }
 
 impl<'a> Integrator<'a> {
@@ -77,6 +82,7 @@ impl<'a> Integrator<'a> {
             known: Vec::new(),
             largest: 0.0,
             failed: false,
+            left: HALVED_AT_ONCE,
         }
     }
 
@@ -88,6 +94,7 @@ impl<'a> Integrator<'a> {
     /// Goes to the time between a sample and the next.
     pub(crate) fn enter(&mut self, sample: usize) {
         let columns = self.columns;
+        self.left = (self.left + HALVED).min(HALVED_AT_ONCE);
         let coefficients = [0, 1, 2].map(|index| between(&columns.coefficients[index], sample));
         #[allow(clippy::float_cmp, reason = "whether they are the same numbers")]
         if coefficients != self.coefficients {
@@ -153,7 +160,12 @@ impl<'a> Integrator<'a> {
         let seconds = self.columns.delta;
         self.largest = self.largest.max(end[0].abs()).max(seconds * end[1].abs());
         let difference = (end[0] - whole[0]).abs() + seconds * (end[1] - whole[1]).abs();
-        if difference > TOLERANCE * self.largest && halvings < HALVINGS {
+        if difference > TOLERANCE * self.largest && halvings < HALVINGS && !self.failed {
+            let Some(left) = self.left.checked_sub(1) else {
+                self.failed = true;
+                return end;
+            };
+            self.left = left;
             let middle = self.controlled(x, first, direction, halvings + 1);
             return self.controlled(middle, second, direction, halvings + 1);
         }

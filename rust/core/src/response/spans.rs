@@ -242,6 +242,19 @@ mod tests {
         assert!(held.angle.iter().all(|&angle| angle == 0.019));
     }
 
+    /// Steps as short as they may be are sound, but there are thousands of them in every sample period.
+    #[test]
+    fn a_pendulum_that_swings_hundreds_of_times_in_a_sample_period_is_lost_soon() {
+        let torque = vec![0.0; 500];
+        let torque: &[f64] = &torque;
+        let of = |gravity: f64| {
+            alone(system(&torque, [1.0, 0.0, 0.0], &[("gravity", gravity)]), Begins::In([0.5, 0.0])).lost
+        };
+        assert!(of(1e10).is_some_and(|sample| (2..30).contains(&sample)), "{:?}", of(1e10));
+        // A tenth of a swing in a sample period.
+        assert_eq!(of(4e3), None);
+    }
+
     /// The energy of a pendulum that swings far.
     #[test]
     fn a_pendulum_keeps_its_energy() {
