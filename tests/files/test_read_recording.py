@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 import pytest
 
 import tvident
@@ -123,3 +124,10 @@ def test_times_of_few_digits_tell_the_rate_unless_samples_were_lost() -> None:
         match="a sample rate needs times that tell it; those of the recording do not: t must tell samples apart",
     ):
         _ = tvident.FileRecording({"time": coarse, "angle": angle}).sample_rate
+
+
+def test_channels_of_words_and_tables_have_a_sample_rate() -> None:
+    time = np.arange(50) / 1000
+    channels = {"time": time, "label": np.array(["rest", "motion"] * 25), "note": np.array([None, 1.5] * 25)}
+    assert tvident.FileRecording(channels).sample_rate == 1000
+    assert tvident.FileRecording(pd.DataFrame(channels)).sample_rate == 1000

@@ -81,6 +81,17 @@ def test_errors_of_spreadsheets_are_missing_and_counted(
     np.testing.assert_array_equal(list(found.values()), np.array(expected, dtype=float))
 
 
+@pytest.mark.parametrize("row", ["#N/A,#N/A", "#DIV/0!,#DIV/0!", "#DIV/0!,"])
+def test_a_first_row_of_errors_is_a_row_and_no_names(tmp_path: Path, row: str) -> None:
+    """The row was gone, or its errors took the names' place."""
+    (tmp_path / "x.csv").write_text(f"angle [rad],torque [Nm]\n{row}\n1.5,2.5\n3.5,4.5\n")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", recordings.FileWarning)
+        found = recordings.read(tmp_path / "x.csv")
+    assert [name.partition(" ")[0] for name in found] == ["angle", "torque"]
+    np.testing.assert_array_equal(list(found.values()), [[np.nan, 1.5, 3.5], [np.nan, 2.5, 4.5]])
+
+
 def test_what_only_begins_as_an_error_is_a_comment(tmp_path: Path) -> None:
     content = "#N/A means missing\na,b\n1,2 #REF! to another sheet\n3,4#note\n"
     with warnings.catch_warnings():

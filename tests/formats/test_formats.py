@@ -265,6 +265,14 @@ def test_errors_in_a_sheet_are_missing_and_counted(tmp_path: Path) -> None:
     np.testing.assert_array_equal(list(found.values()), [[1, 2, np.nan], [np.nan, 5, np.nan]])
 
 
+def test_names_in_a_sheet_that_begin_with_a_sign_are_no_errors(tmp_path: Path) -> None:
+    book = import_module("openpyxl").Workbook()
+    for row in (("#1 A", "#2!"), (1.0, 3.0), (2.0, 5.0)):
+        book.active.append(row)
+    book.save(tmp_path / "x.xlsx")
+    assert list(recordings.read(tmp_path / "x.xlsx")) == ["1 A", "2!"]
+
+
 @pytest.mark.filterwarnings("ignore")  # of libraries about each other
 def test_tables_of_matlab_are_channels(tmp_path: Path) -> None:
     times = pd.to_timedelta(1e3 * examples.T, unit="ms")

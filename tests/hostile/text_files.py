@@ -42,7 +42,7 @@ TOKENS: dict[str, float | None] = {
     "0x10": None,
     "1e999": None,
     "bad": None,
-    "#DIV/0!": None,
+    "#DIV/0!": NAN,
     "1.5V": None,
     "٣": None,
     "\u22121": -1.0,

@@ -10,6 +10,7 @@ import pytest
 
 import tvident
 from tvident import IdentifiedRecords, Status
+from tvident._identify.records import names_shared
 
 Array = npt.NDArray[np.float64]
 
@@ -113,6 +114,13 @@ def test_records_that_differ_in_what_they_share_are_flagged() -> None:
     still = identified([np.zeros(700), np.zeros(800)], [np.zeros(700), np.zeros(800)], share=("inertia",))
     assert np.isnan(still.constants["inertia"]).all()
     assert still.advice[0].startswith("no record determines inertia")
+
+
+def test_names_of_what_is_shared_may_come_in_any_row() -> None:
+    names = ("inertia", "damping")
+    for share in (list(names), np.array(names), dict.fromkeys(names), iter(names)):
+        assert names_shared(share) == names  # type: ignore[arg-type]
+    assert names_shared("inertia") == ("inertia",)
 
 
 def test_several_parameters_are_shared_at_once() -> None:

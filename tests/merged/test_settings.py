@@ -57,6 +57,11 @@ def test_settings_of_trials_repeat_what_was_found(seed: int, kinds: dict[str, An
     assert_alike(found, identify(trials.angle, trials.torque, settings=again.settings, **options))
 
 
+def test_pairs_of_masses_may_come_one_by_one() -> None:
+    pairs = [("base", 0), (0, 1)]
+    assert tvident.Chain(masses=2, springs=iter(pairs)).springs == tuple(pairs)  # type: ignore[arg-type]
+
+
 def test_settings_of_masses_repeat_every_part() -> None:
     record = chain([lambda t: 12 + 0 * t, lambda t: 18 + 3 * np.sin(2 * t)], 3000, seed=2)
     tied = tvident.Chain(masses=2, springs=[("base", 0), (0, 1)], dampers=[("base", 0), (0, 1)])

@@ -30,8 +30,8 @@ _ONE_GROUP = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)
 _INFINITE = re.compile(r"([+-]?)(inf|infinity|1\.#inf)", re.IGNORECASE)
 _MISSING = re.compile(r"([+-]?nan|n/?a|-{1,3}|\*{1,12}|#n/[ad]|#nv|null|none|[+-]?1\.#(qnan|snan|ind))?", re.IGNORECASE)
 _ERROR = (
-    "#(?:n/a|n/d|nv|div/0|¡?(?:div/0|ref|bezug|rif|value|wert|valeur|valor|valore|num|zahl|nombre|name|nom|nome|null|nul|nulo|calc|spill"
-    "|überlauf)[!?])(?=\\s*(?:[\\t,;|\"']|$)|\\s+[-+.#\\d\"'])"
+    "#(?:n/a|n/d|nv|div/0|¡?(?:div/0|deel/0|дел/0|ref|bezug|rif|verw|ссылка|value|wert|valeur|valor|valore|waarde|arg|знач"
+    "|num|zahl|nombre|getal|число|name|nom|nome|naam|имя|null|nul|nulo|leeg|пусто|calc|spill|field|überlauf)[!?])(?=\\s*(?:[\\t,;|\"']|$)|\\s+[-+.#\\d\"'])"
 )
 """What spreadsheets write where a formula found no number, in some languages."""
 
@@ -65,6 +65,11 @@ def without_comment(line: str) -> str:
             return line[:start]
         start = line.find("#", start + 1)
     return line
+
+
+def is_comment(line: str) -> bool:
+    """Return whether a line is nothing but a comment."""
+    return line.lstrip().startswith("#") and not without_comment(line).strip()
 
 
 def hides_numbers(text: str) -> bool:

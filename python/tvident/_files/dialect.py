@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Literal
 
-from tvident._files.cells import Separator, is_present, number, split, without_comment
+from tvident._files.cells import Separator, is_comment, is_present, number, split, without_comment
 from tvident._files.channels import MOST_CHANNELS, Say, check_count
 from tvident._files.headers import Line, Names
 from tvident._files.names import printable
@@ -185,7 +185,7 @@ def _back(lines: Sequence[str], index: int, separator: Separator) -> int:
         cells for cells in (split(line, separator) for line in lines[index : index + _COMPARED]) if len(cells) == width
     ]
     kinds = [_kind([row[column] for row in below]) for column in range(width)]
-    while index > 0 and separator in lines[index - 1] and not lines[index - 1].lstrip().startswith("#"):
+    while index > 0 and separator in lines[index - 1] and not is_comment(lines[index - 1]):
         cells = split(lines[index - 1], separator)
         are_missing = all(number(cell, comma=True) is not None and not is_present(cell, comma=True) for cell in cells)
         if any(cell and not cell.strip("-*") for cell in cells):

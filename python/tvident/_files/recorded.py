@@ -111,7 +111,7 @@ class FileRecording(Mapping[str, Channel]):
     def __init__(
         self, channels: Mapping[str, npt.ArrayLike], *, sample_rate: float | None = None, source: str = "the recording"
     ) -> None:
-        if not isinstance(channels, Mapping):
+        if not hasattr(channels, "items"):
             raise TypeError(
                 f"channels must be a mapping of names to samples; got {arguments.shown(channels)}; write {{'angle [deg]': samples}}, say"
             )
@@ -178,7 +178,7 @@ class FileRecording(Mapping[str, Channel]):
         try:
             period = arguments.sample_period(time.size, t=time)
             for values in self._channels.values():
-                if values.shape == time.shape and not _increases(values):
+                if values.dtype.kind in "iuf" and values.shape == time.shape and not _increases(values):
                     arguments.check_no_lost_samples(time, values)
         except arguments.NotUniformError as error:
             lost = next((part for part in str(error).split("; ") if part.startswith("samples are lost")), "")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from datetime import datetime, time, timedelta
 from typing import Any
@@ -13,6 +14,7 @@ _OF_THE_FULLEST = 0.1
 """A sheet with fewer numbers than this part of the fullest describes the recording rather than being it."""
 
 _ERRORS = frozenset(("#N/A", "#DIV/0!", "#REF!", "#VALUE!", "#NUM!", "#NAME?", "#NULL!"))
+_IS_ERROR = re.compile("#(?:[A-Z_/0]+[!?]|N/A)")
 """What cells say whose formula found no number; newer programs have more words."""
 
 _BREAKS = str.maketrans({"\t": " ", "\n": " ", "\r": " ", '"': "'", "#": " "})
@@ -61,7 +63,7 @@ def _cell(value: Any) -> str:
     if isinstance(value, bool | float | int | timedelta):
         return repr(value.total_seconds() if isinstance(value, timedelta) else +value)
     text = str(value)
-    if text.startswith("#") and text.endswith(("!", "?", "A")):
+    if _IS_ERROR.fullmatch(text):
         # What a formula could not compute is no number, whatever it is called.
         return text if text in _ERRORS else "#VALUE!"
     return text.translate(_BREAKS).strip()

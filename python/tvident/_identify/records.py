@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,7 +31,7 @@ _CHANCE = 3.09
 
 def names_shared(share: str | Sequence[str]) -> tuple[str, ...]:
     """Return what records share, by name, each once."""
-    names = tuple(share) if isinstance(share, list | tuple | set | frozenset | dict) else (share,)
+    names = tuple(share) if isinstance(share, Iterable) and not isinstance(share, str | bytes) else (share,)
     return tuple(dict.fromkeys(arguments.one_of("share", name, COEFFICIENTS) for name in names))
 
 

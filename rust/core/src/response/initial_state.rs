@@ -37,6 +37,10 @@ pub(crate) fn initial_state(system: &mut impl Responds, recorded: &[f64], delta:
     let mut state = line(recorded, delta);
     let mut base = system.angles(state, true)?;
     let mut squares = squares(recorded, &base);
+    if squares.is_nan() {
+        // A response that ends before the record does tells nothing of the beginning.
+        return Some(state);
+    }
     for _ in 0..STEPS {
         let duration = delta * recorded.len() as f64;
         let moved = [MOVED * size, MOVED * size / duration.max(delta)];
@@ -60,7 +64,7 @@ pub(crate) fn initial_state(system: &mut impl Responds, recorded: &[f64], delta:
             }
             step = step.map(|value| 0.5 * value);
         }
-        if squares.is_nan() || before - squares <= GAIN * before {
+        if before - squares <= GAIN * before {
             break;
         }
     }

@@ -12,9 +12,10 @@ const TOLERANCE: f64 = 1e-9;
 /// Halvings of a sample period at most, and what may be wrong then.
 const HALVINGS: u32 = 12;
 const UNSOUND: f64 = 1e-4;
-/// Steps that are halved in a sample period in the mean, and in a few that need more: a system that is faster is too fast for its samples.
-const HALVED: usize = 128;
-const HALVED_AT_ONCE: usize = 1 << 16;
+/// Steps that are halved in a sample period in the mean, half of all that there may be, and in a few that need more: a system that is faster is
+/// too fast for its samples. Where damping outweighs the inertia within a hundredth of a period some 300 are.
+const HALVED: usize = 2048;
+const HALVED_AT_ONCE: usize = 1 << 13;
 
 /// Which derivatives of the angle the equation has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
