@@ -14,7 +14,7 @@ from tvident import Status
 Array = npt.NDArray[np.float64]
 Pattern = Literal["slider", "constant"]
 
-RATE = 1000.0
+RATE, SLOW = 1000.0, 200.0
 INSIDE = slice(500, -500)
 LOST, LOSSES = 3, 40
 ERROR = 0.6e-2
@@ -60,6 +60,18 @@ def test_equations_over_lost_samples_are_left_out_and_said(gap: str) -> None:
     assert np.var((recorded - predicted)[compared]) < EXPLAINED * np.var(recorded[compared])
     # Equations over a loss are missing, and those between are not.
     assert 0.02 < np.mean(result.status & Status.GAP != 0) < 0.5
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_neighbouring_losses_of_a_motion_that_is_fast_for_its_rate_are_found(seed: int) -> None:
+    rig = tvident.simulate_torsional_rig(20.0, sample_rate=SLOW, seed=seed, pattern="constant", angle_noise=1e-3)
+    there = lost_places(rig.angle.size, seed)
+    result = tvident.identify(rig.angle[there], rig.torque[there], sample_rate=SLOW)
+    assert abs(result.inertia[0] / rig.inertia[0] - 1) < ERROR
+    assert "inertia" in result.constants
+    error = (result.stiffness / rig.stiffness[there] - 1)[INSIDE]
+    assert float(np.sqrt(np.mean(error**2))) < ERROR
+    assert result.trusted[INSIDE].mean() > 0.95
 
 
 @pytest.mark.parametrize(("length", "seed"), [(0.1, 1), (0.05, 2)])

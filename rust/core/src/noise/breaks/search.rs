@@ -1,12 +1,12 @@
 //! Places at which an angle jumps between two samples, as it does where a recorder loses samples and leaves no gap.
 //!
 //! A mass has no jump of its angle: an impact changes its velocity, a torque its acceleration. So windows around every border of two samples are
-//! asked for a step there. Where that shows that samples are lost, and how many, longer windows are asked for shifts of time by as many, which
-//! are found where the motion turns round, too.
+//! asked for a step there. Where that shows that samples are lost, and how many, windows whose length the record chooses are asked for shifts of
+//! time by about as many, which are found where the motion turns round or is fast, and next to others, too.
 
 use crate::error::Error;
 use crate::exec::pool::Watch;
-use crate::noise::breaks::shift::Shifts;
+use crate::noise::breaks::shift::shifts;
 use crate::noise::breaks::step::Steps;
 use crate::noise::quantisation::quantisation_step;
 use crate::record::samples::Samples;
@@ -15,8 +15,7 @@ use crate::record::samples::Samples;
 /// two breaks close together.
 const WINDOWS: [(usize, usize, usize); 2] = [(10, 5, 2), (5, 3, 1)];
 
-/// The same for shifts, and how many steps show that the recorder loses samples.
-const LONG: (usize, usize) = (20, 5);
+/// How many steps show that the recorder loses samples.
 const ENOUGH: usize = 3;
 
 /// The samples before which an angle jumps, in order.
@@ -36,7 +35,7 @@ pub(crate) fn breaks(angle: &dyn Samples, watch: &mut Watch<'_>) -> Result<Vec<u
         found.sort_unstable();
     }
     if found.len() >= ENOUGH {
-        let more = Shifts::new(LONG.0, LONG.1).find(angle, quantum, &found, watch)?;
+        let more = shifts(angle, quantum, &found, watch)?;
         found.extend(more);
         found.sort_unstable();
     }
@@ -94,6 +93,34 @@ mod tests {
         let exact: Vec<f64> = (0..samples).map(|n| motion(n as f64)).collect();
         assert_eq!(found(&exact), [] as [usize; 0]);
         assert_eq!(found(&broken[..15]), [] as [usize; 0]);
+    }
+
+    #[test]
+    fn neighbouring_losses_are_found_however_fast_the_motion_is() {
+        let samples = 4000;
+        let noise = uniform(samples);
+        // 16 and 64 samples a cycle at least; losses apart by less than a window, and by less than a test function.
+        for (speed, apart, loud) in [(1.0, 6, 0.0), (1.0, 6, 2e-3), (0.25, 3, 0.0), (0.25, 3, 2e-3)] {
+            let motion = |time: f64| (0.39 * time).sin() + 0.8 * (0.23 * time + 1.0).cos() + 0.9 * (0.11 * time).sin();
+            let motion = |time: f64| motion(speed * time);
+            let near = [(500, 3), (511, 3), (900, 3), (900 + apart, 3), (2100, 6), (2120, 3), (2800, 3), (2812, 2)];
+            let is_near = |place: usize| near.iter().any(|&(one, _)| place.abs_diff(one) < 30);
+            let single = (1..36).map(|n| 300 + 97 * n).filter(|&place| !is_near(place));
+            let lost: Vec<(usize, usize)> = single.map(|place| (place, 3)).chain(near).collect();
+            let before = |sample: usize| -> usize {
+                lost.iter().filter(|&&(place, _)| place <= sample).map(|&(_, lost)| lost).sum()
+            };
+            let time = |sample: usize| (sample + before(sample)) as f64;
+            let broken: Vec<f64> = (0..samples).map(|n| motion(time(n)) + loud * noise[n]).collect();
+            let places = found(&broken);
+            // Between those that are close together some samples are no use.
+            let missed = |&&(place, _): &&(usize, usize)| places.iter().all(|found| found.abs_diff(place) > 2);
+            assert_eq!(lost.iter().find(missed), None, "{places:?}");
+            let elsewhere = |&&found: &&usize| lost.iter().all(|&(place, _)| found.abs_diff(place) > 8);
+            assert_eq!(places.iter().find(elsewhere), None, "{places:?}");
+            let whole: Vec<f64> = (0..samples).map(|n| motion(n as f64) + loud * noise[n]).collect();
+            assert_eq!(found(&whole), [] as [usize; 0]);
+        }
     }
 
     #[test]

@@ -97,7 +97,7 @@ impl Steps {
             return Ok(Vec::new());
         };
         let mut sizes = Vec::new();
-        borders(channel, self.half, known, watch, |values, standing| {
+        borders(channel, self.half, known, watch, |_, values, standing| {
             self.sizes(values, &mut sizes);
             let large = sizes.iter().enumerate().filter(|(_, size)| size.abs() > CONSPICUOUS * usual.size);
             standing.extend(large.filter_map(|(place, size)| {

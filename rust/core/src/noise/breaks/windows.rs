@@ -54,7 +54,7 @@ impl Size {
 }
 
 /// The borders at which windows stand out most, each the first of those within half a window, but none near `known` ones. `conspicuous` gives the
-/// windows that stand out among those of consecutive samples, and how much.
+/// windows that stand out among those of consecutive samples, from the first on, and how much.
 ///
 /// # Errors
 /// If the watch cancels.
@@ -63,7 +63,7 @@ pub(crate) fn borders(
     half: usize,
     known: &[usize],
     watch: &mut Watch<'_>,
-    mut conspicuous: impl FnMut(&[f64], &mut Vec<(usize, f64)>),
+    mut conspicuous: impl FnMut(usize, &[f64], &mut Vec<(usize, f64)>),
 ) -> Result<Vec<usize>, Error> {
     let (length, samples) = (2 * half, channel.len());
     let windows = (samples + 1).saturating_sub(length);
@@ -79,7 +79,7 @@ pub(crate) fn borders(
         values.resize((windows - first).min(TOGETHER) + length - 1, 0.0);
         channel.read(first, &mut values);
         standing.clear();
-        conspicuous(&values, &mut standing);
+        conspicuous(first, &values, &mut standing);
         let borders = standing.iter().map(|&(place, size)| (first + place + half, size));
         for (border, size) in borders.filter(|&(border, _)| !is_known(border)) {
             match found.last_mut() {
@@ -96,7 +96,7 @@ pub(crate) fn borders(
 }
 
 /// Takes off a column what others explain whose first elements, so many, are orthonormal. Twice, since the first time leaves rounding.
-pub(crate) fn take_off(column: &mut [f64], others: &[Vec<f64>], first: usize) {
+fn take_off(column: &mut [f64], others: &[Vec<f64>], first: usize) {
     for _ in 0..2 {
         for other in others {
             let part = product(&column[..first], &other[..first]);
