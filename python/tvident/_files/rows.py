@@ -81,8 +81,8 @@ class Rows:
         """Where columns of words have their first, and the word."""
         self._numbers: set[int] = set()
         """Columns without anything in the first lines that have numbers further below."""
-        self._errors: list[tuple[int, int, str]] = []
-        """Line, column and cell of the first error of a spreadsheet."""
+        self._error: tuple[int, int, str] | None = None
+        """Line, column and cell of the first error of a spreadsheet, of so many."""
         self._error_count = 0
         self.hollow = 0
         """Rows at the end that hold separators alone."""
@@ -137,7 +137,8 @@ class Rows:
             self._say(
                 f"column '{printable(self._dialect.names[column], 40)}': not read, it holds words{remark and ': ' + remark}"
             )
-        for place, column, cell in self._errors:
+        if self._error is not None:
+            place, column, cell = self._error
             count = f"{self._error_count} cells hold errors" if self._error_count > 1 else "one cell holds an error"
             name = printable(self._dialect.names[column], 40)
             self._say(
@@ -317,7 +318,7 @@ class Rows:
         if math.isfinite(value):
             self._note_sign(place, cell)
         elif is_error(cell):
-            self._errors = self._errors or [(place, column, cell)]
+            self._error = self._error or (place, column, cell)
             self._error_count += 1
         return value
 

@@ -14,13 +14,9 @@ pub(crate) struct Around<'a> {
     full: Predictor<'a>,
 }
 
-/// A window at a row: the candidate, which predicts the row without containing it, the reference, whose coefficients
-/// are used there, and the time of the row after their centre.
+/// A window at a row, and the time of the row after its centre.
 pub(crate) struct WindowAtRow<'a, 'b> {
-    candidate: &'b Predictor<'a>,
-    reference: &'b Predictor<'a>,
-    place: usize,
-    reference_place: usize,
+    window: WindowOfCell<'a, 'b>,
     later: f64,
 }
 
@@ -32,10 +28,9 @@ impl<'a> Around<'a> {
 
     /// The window before (0), around (1) or after (2) a row, or `None` if it does not exist or a jump lies between.
     pub(crate) fn at_row(&self, problem: &Problem<'_>, row: usize, which: usize) -> Option<WindowAtRow<'a, '_>> {
-        let WindowOfCell { candidate, reference, place, reference_place, .. } =
-            self.of_cell(self.scale.cell(row), which)?;
-        let later = self.later(problem, self.scale.cell(row), row, which)?;
-        Some(WindowAtRow { candidate, reference, place, reference_place, later })
+        let cell = self.scale.cell(row);
+        let window = self.of_cell(cell, which)?;
+        Some(WindowAtRow { window, later: self.later(problem, cell, row, which)? })
     }
 
     /// Gives what the windows at some rows leave of these, by row, where there are such windows.
@@ -131,7 +126,8 @@ impl<'a> Around<'a> {
     }
 }
 
-/// The window of the rows of a cell: the candidate and the reference, and where they stand.
+/// The window of the rows of a cell: the candidate, which predicts them without containing them, the reference, whose coefficients are used there,
+/// and where both stand.
 struct WindowOfCell<'a, 'b> {
     candidate: &'b Predictor<'a>,
     reference: &'b Predictor<'a>,
@@ -142,27 +138,27 @@ struct WindowOfCell<'a, 'b> {
 impl WindowAtRow<'_, '_> {
     /// The reference's value of a windowed unknown at the row.
     pub(crate) fn value(&self, unknown: usize) -> f64 {
-        self.reference.value(self.reference_place, unknown, self.later)
+        self.window.reference.value(self.window.reference_place, unknown, self.later)
     }
 
     pub(crate) fn slope(&self, unknown: usize) -> f64 {
-        self.reference.value(self.reference_place, unknown, 1.0)
-            - self.reference.value(self.reference_place, unknown, 0.0)
+        self.window.reference.line(self.window.reference_place, unknown).slope()
     }
 
     pub(crate) fn variance(&self, unknown: usize) -> f64 {
-        self.reference.variance(self.reference_place, unknown, self.later)
+        self.window.reference.variance(self.window.reference_place, unknown, self.later)
     }
 
     /// The candidate's prediction of the row's right-hand side.
     pub(crate) fn predict(&self, problem: &Problem<'_>, row: usize) -> f64 {
-        self.candidate.predict(problem, self.place, row, self.later)
+        self.window.candidate.predict(problem, self.window.place, row, self.later)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::regression::sides::Sides;
     use crate::regression::simulated::{CONSTANTS, PERIOD, assert_near, model, rows, staged};
     use crate::simd::instructions::Instructions;
 
@@ -181,9 +177,7 @@ mod tests {
         let problem = model().problem(&rows, &rows.rhs, 0.0, None);
         let scale = *Scale::all(ROWS, 3).iter().find(|scale| scale.stands_alone()).expect("a length");
         let all = scale.one_sided_cells(ROWS);
-        let cells = staged(|stages| {
-            scale.solve(&problem, (&all, crate::regression::sides::Sides::ALL), Instructions::Scalar, stages)
-        });
+        let cells = staged(|stages| scale.solve(&problem, (&all, Sides::ALL), Instructions::Scalar, stages));
         let around = Around::new(scale, &cells, &CONSTANTS);
         [0, 1, 2].map(|which| {
             let window = around.at_row(&problem, ROW, which)?;

@@ -42,21 +42,12 @@ impl<'a> Predictor<'a> {
 
     /// A windowed unknown at a time, in seconds after the window's centre.
     pub(crate) fn value(&self, place: usize, windowed: usize, later: f64) -> f64 {
-        let layout = self.solved.fields.layout;
-        let slope = if layout.linear { self.values[layout.windowed + windowed][place] } else { 0.0 };
-        self.values[windowed][place] + later * slope
+        self.line(place, windowed).value(later)
     }
 
     /// Its variance there.
     pub(crate) fn variance(&self, place: usize, windowed: usize, later: f64) -> f64 {
-        let (fields, layout) = (self.solved.fields, self.solved.fields.layout);
-        let entry = |i, j| self.solved.field(fields.covariance(i, j))[place];
-        let mut variance = entry(windowed, windowed);
-        if layout.linear {
-            let slope = layout.windowed + windowed;
-            variance += 2.0 * later * entry(windowed, slope) + later * later * entry(slope, slope);
-        }
-        variance
+        self.track(place, windowed).variance(later)
     }
 
     /// The contribution of the windowed unknowns to a row's right-hand side.
@@ -69,7 +60,7 @@ impl<'a> Predictor<'a> {
     }
 
     /// A windowed unknown without its variances.
-    fn line(&self, place: usize, windowed: usize) -> UnknownInWindow {
+    pub(crate) fn line(&self, place: usize, windowed: usize) -> UnknownInWindow {
         let layout = self.solved.fields.layout;
         let slope = if layout.linear { self.values[layout.windowed + windowed][place] } else { 0.0 };
         UnknownInWindow { value: self.values[windowed][place], slope, variances: [0.0; 3] }
@@ -84,16 +75,22 @@ impl<'a> Predictor<'a> {
 
     /// All windowed unknowns.
     pub(crate) fn tracks(&self, place: usize, tracks: &mut [UnknownInWindow]) {
+        for (windowed, track) in tracks.iter_mut().enumerate() {
+            *track = self.track(place, windowed);
+        }
+    }
+
+    /// A windowed unknown.
+    fn track(&self, place: usize, windowed: usize) -> UnknownInWindow {
         let (fields, layout) = (self.solved.fields, self.solved.fields.layout);
         let entry = |i, j| self.solved.field(fields.covariance(i, j))[place];
-        for (windowed, track) in tracks.iter_mut().enumerate() {
-            *track = self.line(place, windowed);
-            track.variances[0] = entry(windowed, windowed);
-            if layout.linear {
-                let slope = layout.windowed + windowed;
-                track.variances = [track.variances[0], entry(windowed, slope), entry(slope, slope)];
-            }
+        let mut track = self.line(place, windowed);
+        track.variances[0] = entry(windowed, windowed);
+        if layout.linear {
+            let slope = layout.windowed + windowed;
+            track.variances = [track.variances[0], entry(windowed, slope), entry(slope, slope)];
         }
+        track
     }
 }
 
