@@ -175,8 +175,12 @@ impl MergedSession<'_, '_, '_> {
             let Some(Freed { one, found, guess }) = self.freed(&fitted, tried, hidden)? else {
                 (self.parameters, self.misfits) = before;
                 self.fill();
-                let fitted = self.told_by_what_is_left(fitted)?;
-                return self.held_by_torques(fitted).map(Some);
+                let told = self.told_by_what_is_left(fitted)?;
+                let Some(again) = self.freed_together(&told)? else {
+                    return self.held_by_torques(told).map(Some);
+                };
+                fitted = MergedFit { tests: told.tests, ..again };
+                continue;
             };
             if !self.is_open(one) {
                 // What it is asked to be stands, and nothing else is to follow what it does.
@@ -236,6 +240,27 @@ impl MergedSession<'_, '_, '_> {
             }
         }
         Ok(best)
+    }
+
+    /// A fit in which windows follow all constants at once that differ even beside what is left, if that explains far more: of what changes at the
+    /// same time none alone is worth its windows, and a jump is seen only beside all that jump.
+    fn freed_together(&mut self, told: &MergedFit) -> Result<Option<MergedFit>, Error> {
+        let may_be_freed = |one: usize| told.model.constant.contains(&one) && self.is_open(one);
+        let differ: Vec<_> = different(&told.tests).into_iter().filter(|&one| may_be_freed(one)).collect();
+        if told.error <= MORE || differ.is_empty() {
+            return Ok(None);
+        }
+        let before = (self.parameters.clone(), self.misfits.clone(), self.jumps.clone());
+        let freer = differ.into_iter().fold(told.model.clone(), |model, one| without(&model, one));
+        if let Some(free) = self.fitted(&freer)? {
+            let free = self.beside_jumps(free)?;
+            if free.error < SHOWN * told.error {
+                return Ok(Some(free));
+            }
+        }
+        (self.parameters, self.misfits, self.jumps) = before;
+        self.fill();
+        Ok(None)
     }
 
     /// A fit beside which an element was set free, or one with another in its place that explains far more: parts hardly differ in what swings
