@@ -9,6 +9,7 @@ import numpy as np
 
 from tvident import _core
 from tvident._advice import held, spoilt
+from tvident._equation import BUILT_IN
 from tvident._files import aligned
 from tvident._merged.merging import Merging, Part
 from tvident._results import COLUMNS, Words, row_of, sentences_of
@@ -38,6 +39,7 @@ def words_of(result: Any, merging: Merging, scatter: Mapping[str, float]) -> Wor
         advice += [words for flag, words in _DOUBTS.items() if one.record_status & flag]
         advice += [_SILENT] if one.misfit > 1 else []
         advice += _channels_of(part, merging.masses, sampling.period)
+        advice += _lacking_terms(part, merging)
     advice += _changing(result)
     reasons += _tested(result)
     for name, factor in scatter.items():
@@ -91,6 +93,17 @@ def _channels_of(part: Part, masses: int, period: float) -> list[str]:
         words.append(
             f"{_named(channel, angles, numbers, masses)} seems to be {by}: divide it by as much, or look for another unit or a filter"
         )
+    return words
+
+
+def _lacking_terms(part: Part, merging: Merging) -> list[str]:
+    """Return which terms equations seem to lack, and how they are asked for."""
+    words = []
+    for equation, name, found in part.found.terms:
+        whose = f"of mass {part.equations.numbers[equation]}: " if merging.masses else ""
+        amount = f"{found.value:.3g} ± {found.stderr:.1g} {merging.units[name]}"
+        terms = [*dict.fromkeys([*merging.terms, *(other for _, other, _ in part.found.terms)])]
+        words.append(f"{whose}{BUILT_IN[name].suspected(found.value, amount)}: give terms={terms}")
     return words
 
 

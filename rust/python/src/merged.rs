@@ -56,6 +56,7 @@ pub(crate) struct MergedIdentification {
     defects: Vec<ChannelDefect>,
     late: Vec<(usize, Estimate)>,
     lacking: Vec<(usize, Estimate)>,
+    terms: Vec<(usize, &'static str, Estimate)>,
 }
 
 /// One trial: angles, torques and terms, one of each a row, a mask, positions in the result, and weights.
@@ -217,10 +218,15 @@ pub(crate) fn identify_merged<'py>(
         defects: found.defects.iter().map(|(channel, defect)| ChannelDefect::new(*channel, defect)).collect(),
         late: suspects(&found.late),
         lacking: suspects(&found.lacking),
+        terms: found.terms.iter().map(|(equation, one)| (*equation, one.missing.name(), estimate(one))).collect(),
     })
 }
 
 /// What channels are suspected of, with standard errors.
 fn suspects(found: &[(usize, Suspect)]) -> Vec<(usize, Estimate)> {
-    found.iter().map(|(channel, one)| (*channel, Estimate { value: one.value, stderr: one.error })).collect()
+    found.iter().map(|(channel, one)| (*channel, estimate(one))).collect()
+}
+
+fn estimate(one: &Suspect) -> Estimate {
+    Estimate { value: one.value, stderr: one.error }
 }

@@ -24,7 +24,7 @@ const BETTER: f64 = 0.98;
 /// What no test shows to change is windowed only if rows are predicted so much better: it is what the equations lack.
 const LACKING: f64 = 0.5;
 /// Where equations leave more than the noise of the channels and that may be noise, what windows follow must pay by more than chance.
-const SHOWN: f64 = 0.8;
+pub(crate) const SHOWN: f64 = 0.8;
 /// So many times the noise of the channels is hardly noise.
 const NO_NOISE: f64 = 50.0;
 

@@ -75,6 +75,8 @@ pub struct MergedFound {
     pub late: Vec<(usize, Suspect)>,
     /// Angles that no equation is of whose gain seems to be wrong, and the part of themselves that they lack.
     pub lacking: Vec<(usize, Suspect)>,
+    /// Terms that equations seem to lack, each with its equation.
+    pub terms: Vec<(usize, Suspect)>,
 }
 
 impl MergedFound {

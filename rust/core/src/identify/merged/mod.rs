@@ -17,4 +17,5 @@ pub(crate) mod session;
 pub(crate) mod shown;
 pub(crate) mod silent;
 pub(crate) mod spread;
+pub(crate) mod suspected_terms;
 pub(crate) mod system;

@@ -9,6 +9,7 @@ use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::found::{FoundElement, MergedFound};
 use crate::identify::merged::lags::SuspectedChannels;
 use crate::identify::merged::session::MergedSession;
+use crate::identify::merged::suspected_terms::SuspectedTerms;
 use crate::identify::results::{RowResults, SampleResults};
 use crate::identify::scanned::Scan;
 use crate::inference::constancy::{self, NoiseFrom, Test};
@@ -79,8 +80,7 @@ impl MergedSession<'_, '_, '_> {
         });
         let mut found = MergedFound { elements: elements.collect(), ..self.nothing_yet(fitted) };
         found.elements.sort_by_key(|one| one.element);
-        found.constants.clone_from(&model.constant);
-        (found.condition, found.weakest) = (fit.pooled.condition, weakest);
+        (found.constants, found.condition, found.weakest) = (model.constant.clone(), fit.pooled.condition, weakest);
         for (holds, flag) in [
             (self.at_end || fitted.has_shortest_windows(), Status::WINDOW_LIMIT),
             (
@@ -95,8 +95,9 @@ impl MergedSession<'_, '_, '_> {
         found.scan = std::mem::take(&mut self.scan);
         found.record_status |= found.scan.status(&found.constants_found());
         let SuspectedChannels { each, beside } = self.suspected_channels(fitted, &noise, &correlated)?;
+        let SuspectedTerms { each: terms, beside: beside_terms } = self.suspected_terms(fitted, &noise, &correlated)?;
         let is_other = |beside: Fit| self.are_others(fitted, &beside, &errors, &covariance);
-        let is_wrong = self.is_contradicted(fitted) || beside.is_some_and(is_other);
+        let is_wrong = self.is_contradicted(fitted) || [beside, beside_terms].into_iter().flatten().any(is_other);
         status.iter_mut().filter(|_| is_wrong).for_each(|status| *status |= Status::NOISE_MODEL.bits());
         (found.covariance, found.pairs) = (covariance, pairs);
         (found.late, found.lacking) = each.into_iter().partition(|(_, suspect)| suspect.missing == Missing::Lag);
@@ -104,6 +105,8 @@ impl MergedSession<'_, '_, '_> {
         let is_late = found.late.iter().any(|(_, late)| late.is_conspicuous());
         found.record_status |= if is_late { Status::LAG_SUSPECTED } else { Status::GOOD };
         found.record_status |= if found.lacking.is_empty() { Status::GOOD } else { Status::CHANNEL_SUSPECTED };
+        found.record_status |= if terms.is_empty() { Status::GOOD } else { Status::TERM_SUSPECTED };
+        found.terms = terms;
         let deviation = self.deviation(fitted)?;
         let ([first, stride], period) = (self.all.samples(), self.all.rows.period);
         let results = RowResults {
@@ -331,6 +334,7 @@ impl MergedSession<'_, '_, '_> {
             defects: Vec::new(),
             late: Vec::new(),
             lacking: Vec::new(),
+            terms: Vec::new(),
         }
     }
 

@@ -108,7 +108,7 @@ impl FrictionDirection {
 }
 
 /// What the sign of a velocity is on average, where its error is normal.
-fn expected_sign(velocity: f64, error: f64) -> f64 {
+pub(crate) fn expected_sign(velocity: f64, error: f64) -> f64 {
     if velocity == 0.0 || velocity.is_nan() {
         return velocity;
     }
