@@ -36,13 +36,16 @@ _EXPLAINED, _SEEN = 2.0, 1e-3
 _LEAST = 1e-24
 """Of the mean square of a channel: errors below this are rounding."""
 
+_NOISES = 8
+"""Records of noise that tell how much of it there is at every place."""
+
 
 @np.errstate(all="ignore")
 def chosen_order(grid: Grid, channels: Mapping[str, npt.NDArray[np.number]]) -> int:
     """Return the order with the least errors of all channels.
 
     The error of an order is the variance of the noise that it passes, which follows from the times alone, and the square of its bias: by
-    how much the next order differs, beyond what noise alone makes that.
+    how much the next order differs, beyond what noise alone makes that, where noise makes little of it.
     """
     if grid.jitter <= _SMALL and grid.places.size >= (1 - _FEW_LOST) * grid.samples:
         return _USUAL
@@ -50,8 +53,8 @@ def chosen_order(grid: Grid, channels: Mapping[str, npt.NDArray[np.number]]) -> 
     by_order = [middle.resampled(order, grid.bridged) for order in (*_ORDERS, _JUDGE)]
     gains = [middle.resampling(order, grid.bridged).gain() for order in _ORDERS]
     # What differs between two orders in the channels, and in noise of variance one.
-    changes = [_mean_square(one - other) for one, other in pairwise(by_order)]
-    squares = _mean_square(by_order[0][:-1])
+    changes = [middle.beside_noise(one - other) for one, other in pairwise(by_order)]
+    squares = middle.mean_square(by_order[0])
     # The noise of a channel is at most what makes the two highest orders differ.
     noise = changes[-1][:-1] / changes[-1][-1]
     scores = []
@@ -74,23 +77,16 @@ def longest_bridged(grid: Grid, channels: Mapping[str, npt.NDArray[np.number]], 
     middle = Middle.of(grid, channels)
     every = middle.resampled(order, grid.bridged)
     judge = middle.resampled(_JUDGE, grid.bridged)
-    change = _mean_square(every - judge)
+    change = middle.beside_noise(every - judge)
     noise = change[:-1] / change[-1] if change[-1] > 0 else np.zeros(change.size - 1)
-    squares = _mean_square(every[:-1])
+    squares = middle.mean_square(every)
     for lost in range(1, math.floor(grid.bridged)):
         kept = np.arange(middle.places.size) % (_APART * lost) >= lost
         holed = Middle(middle.places[kept], middle.samples, middle.rows[:, kept])
-        wrong = _mean_square(_missed(holed, middle, kept, order))
+        wrong = middle.beside_noise(_missed(holed, middle, kept, order))
         if (wrong[:-1] > _EXPLAINED * noise * wrong[-1] + _SEEN**2 * squares).any():
             return max(float(lost), LEAST_BRIDGED)
     return grid.bridged
-
-
-def _mean_square(rows: Numbers) -> Numbers:
-    """Return the mean square of what is known of every row; NaN where nothing is."""
-    counts = np.isfinite(rows).sum(axis=1)
-    sums = np.sum(np.where(np.isfinite(rows), rows, 0.0) ** 2, axis=1)
-    return np.asarray(np.where(counts > 0, sums / np.maximum(counts, 1), np.nan))
 
 
 def _missed(holed: Middle, middle: Middle, kept: npt.NDArray[np.bool_], order: int) -> Numbers:
@@ -102,7 +98,7 @@ def _missed(holed: Middle, middle: Middle, kept: npt.NDArray[np.bool_], order: i
 
 @dataclass(frozen=True)
 class Middle:
-    """The middle of a record: some channels, and noise of variance one as the last.
+    """The middle of a record: some channels, and records of noise of variance one after them.
 
     Parameters
     ----------
@@ -110,7 +106,7 @@ class Middle:
         Times in periods.
     samples : int
         Of the grid.
-    rows : ndarray, shape (channels + 1, n)
+    rows : ndarray, shape (channels + noises, n)
     """
 
     places: Numbers
@@ -124,11 +120,28 @@ class Middle:
         part = slice(first, first + _LOOKED_AT)
         places = grid.places[part] - np.ceil(grid.places[part][0])
         rows = [row[part] for values in channels.values() for row in values.reshape(-1, values.shape[-1])[:_RECORDS]]
-        noise = np.random.default_rng(0).standard_normal(places.size)
-        every = np.stack([*rows, noise]).astype(np.float64)
+        noise = np.random.default_rng(0).standard_normal((_NOISES, places.size))
+        every = np.stack([*rows, *noise]).astype(np.float64)
         # What the core takes for no number is none here.
         every[~(np.abs(every) <= arguments.LARGEST)] = np.nan
         return cls(places, math.floor(places[-1]) + 1, every)
+
+    def mean_square(self, rows: Numbers) -> Numbers:
+        """Return the mean square of what is known of every channel; NaN where nothing is."""
+        return _mean_square(rows[:-_NOISES], np.ones(rows.shape[1]))
+
+    def beside_noise(self, rows: Numbers) -> Numbers:
+        """Return the mean square of what is known of every channel, and that of noise of variance one last.
+
+        Where samples lie close together splines amplify noise a thousand times: few such places would make most of a mean, and chance alone
+        sets these of two records of noise apart several times. So a place counts less by as much as noise is larger there than a sample's.
+        """
+        noise = rows[-_NOISES:]
+        there = np.mean(noise**2, axis=0)
+        weights = 1 / np.maximum(there, 1.0)
+        # Each record of noise is weighed by the others, as channels are by records that are not theirs.
+        own = 1 / np.maximum((_NOISES * there - noise**2) / (_NOISES - 1), 1.0)
+        return np.append(_mean_square(rows[:-_NOISES], weights), _mean_square(noise, own).mean())
 
     def resampling(self, order: int, bridged: float) -> _core.Resampling:
         """Return how it is brought onto the grid."""
@@ -137,3 +150,10 @@ class Middle:
     def resampled(self, order: int, bridged: float) -> Numbers:
         """Return it on the grid."""
         return self.resampling(order, bridged).onto_grid(self.rows, workers=1)
+
+
+def _mean_square(rows: Numbers, weights: Numbers) -> Numbers:
+    """Return the weighted mean square of what is known of every row; NaN where nothing is."""
+    known = np.where(np.isfinite(rows), weights, 0.0)
+    sums = np.sum(known * np.where(np.isfinite(rows), rows, 0.0) ** 2, axis=1)
+    return np.asarray(sums / np.sum(known, axis=1))
