@@ -116,6 +116,62 @@ def test_windows_of_rows_are_those_of_the_batch(
     assert np.array_equal(np.concatenate([out.row for out in outs]), np.arange(0, 1000, step))
 
 
+@settings(max_examples=examples(12))
+@given(
+    PIECES,
+    st.integers(1, 5),
+    st.integers(1, 2),
+    st.sampled_from([9, 64, 300]),
+    st.sampled_from([0, 7]),
+    st.tuples(st.sampled_from(get_args(Alignment)), st.sampled_from([None, 6, 9]), st.sampled_from([None, 30.0])),
+    st.sampled_from([1.0, 3e-7, 1e200]),
+)
+def test_windows_of_weighted_rows_are_those_of_the_batch(
+    lengths: list[int],
+    p: int,
+    q: int,
+    window: int,
+    resume: int,
+    told: tuple[Alignment, int | None, float | None],
+    scale: float,
+) -> None:
+    generator = np.random.default_rng(p + 10 * q + window)
+    A, b = generator.standard_normal((1000, p)), generator.standard_normal((1000, q))
+    weights = scale * 10 ** generator.uniform(-2, 2, 1000)
+    weights[generator.random(1000) < 0.1] = 0
+    weights[700:730] = 0
+    A[400, 0] = np.nan
+    weights[400] = 0
+    b[[10, 405, 998], -1] = np.nan
+    weights[10] = 0
+    alignment, least, half_life = told
+    options: dict[str, Any] = {"alignment": alignment, "min_observations": least}
+    if alignment != "centre":
+        options["half_life"] = half_life
+    stream = tvident.RollingStream(window, **options)
+    outs = streamed(
+        stream, 1000, lengths, lambda one, piece: one.push(A[piece], b[piece], weights=weights[piece]), resume
+    )
+    batch = tvident.rolling_least_squares(A, b, window, weights=weights, **options)
+    for name in ("params", "stderr", "rss", "condition", "status"):
+        found = np.concatenate([getattr(out, name) for out in outs])
+        assert np.array_equal(found, getattr(batch, name), equal_nan=name != "status"), name
+
+
+def test_rows_of_a_stream_all_have_weights_or_none() -> None:
+    A, b = np.arange(40.0).reshape(20, 2) % 7, np.arange(20.0)
+    weighted, plain = tvident.RollingStream(9), tvident.RollingStream(9)
+    weighted.push(A, b, weights=np.zeros(20))
+    with pytest.raises(ValueError, match="must all have weights, or none of them; got some without after others with"):
+        weighted.push(A, b)
+    plain.push(A, b)
+    with pytest.raises(ValueError, match="got some with after others without"):
+        plain.push(A[0], b[0], weights=1.0)
+    with pytest.raises(ValueError, match=r"weights must be finite and not negative; weights\[1\] is -1"):
+        weighted.push(A[:2], b[:2], weights=[1, -1])
+    assert np.isfinite(weighted.push(A, b, weights=np.ones(20)).params[-1]).all()
+
+
 @settings(max_examples=examples(4))
 @given(PIECES, st.sampled_from([(201, 200), (51, 301), (301, 64)]), st.sampled_from([1, 5]), st.sampled_from([0, 7]))
 def test_windowed_parameters_are_those_of_the_batch(

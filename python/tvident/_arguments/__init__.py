@@ -1,6 +1,6 @@
 """Checks what users pass: every message states the rule, the value that broke it and the cure."""
 
-from tvident._arguments.arrays import along_axis, any_array, check_nan, mask, real_array, weights
+from tvident._arguments.arrays import along_axis, any_array, check_nan, mask, real_array, some_weights, weights
 from tvident._arguments.channels import as_record, channel, channels
 from tvident._arguments.containers import fields_of, is_table, package_of, plain, time_axis
 from tvident._arguments.digits import explained_in_words, ordinal, own_digits, percent, to_digits_of, with_error
@@ -82,6 +82,7 @@ __all__ = [
     "sample_period",
     "seconds",
     "shown",
+    "some_weights",
     "time_axis",
     "times_of",
     "to_digits_of",

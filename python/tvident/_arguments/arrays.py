@@ -121,9 +121,19 @@ def weights(name: str, values: npt.ArrayLike | None, shape: tuple[int, ...]) -> 
     """Return weights, one for every sample, or None; a masked one is zero."""
     if values is None:
         return None
+    array = some_weights(name, values, shape)
+    if not array.any():
+        raise ValueError(f"{name} must leave something to use; got zeros alone; give a weight above zero")
+    return array
+
+
+def some_weights(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
+    """Return weights of some samples of more, which may all be zero; that of a single one may be a number."""
     array = np.array(
         any_array(name, np.ma.filled(values, 0.0) if np.ma.is_masked(values) else values), dtype=np.float64
     )
+    if array.ndim == 0 and shape == (1,):
+        array = array.reshape(shape)
     if array.shape != shape:
         raise ValueError(
             f"{name} must have one value for every sample, shape {shape}; got shape {array.shape}; check its length"
@@ -135,6 +145,4 @@ def weights(name: str, values: npt.ArrayLike | None, shape: tuple[int, ...]) -> 
             f"{name} must be finite and not negative; {name}[{', '.join(map(str, place))}] is {array[place]}; give one over the "
             "variance of the sample's noise, relative to the others, and 0 where it is not to be used"
         )
-    if not array.any():
-        raise ValueError(f"{name} must leave something to use; got zeros alone; give a weight above zero")
     return array

@@ -66,6 +66,7 @@ class RollingStream:
         regressors: int,
         rhs_count: int,
         *,
+        weighted: bool = False,
         step: int = 1,
         state: _StreamState | None = None,
     ) -> RollingStream: ...
@@ -74,7 +75,12 @@ class RollingStream:
     @property
     def rows(self) -> int: ...
     def state(self) -> _StreamState: ...
-    def push(self, regressors: npt.NDArray[np.number], rhs: npt.NDArray[np.number]) -> StreamedRegressions: ...
+    def push(
+        self,
+        regressors: npt.NDArray[np.number],
+        rhs: npt.NDArray[np.number],
+        weights: npt.NDArray[np.float64] | None = None,
+    ) -> StreamedRegressions: ...
     def finish(self) -> StreamedRegressions: ...
 
 @final

@@ -13,7 +13,14 @@ from tvident import _arguments as arguments
 from tvident import _core
 from tvident._huber import pseudo_values
 from tvident._regression.durations import FoundInWindows, check_uniform, irregular_times, solved, spans_given
-from tvident._regression.windows import Alignment, AskedWindows, RegressionWindows, lags_given, windows_given
+from tvident._regression.windows import (
+    Alignment,
+    AskedWindows,
+    RegressionWindows,
+    lags_given,
+    unit_of_weights,
+    windows_given,
+)
 
 MOST_REGRESSORS = 16
 """No problem may have more regressors than this."""
@@ -237,9 +244,9 @@ def rolling_least_squares(
     lag = lags_given(lags, windows, is_correlated=is_correlated, is_robust=is_robust)
     every = arguments.whole_number("step", step, least=1)
     weight = arguments.weights("weights", weights, (rows,))
-    largest = 1.0 if weight is None else float(weight.max())
+    unit = 1.0 if weight is None else unit_of_weights(weight)
     with np.errstate(under="ignore"):
-        relative = None if weight is None else weight / largest
+        relative = None if weight is None else weight / unit
     given: npt.NDArray[np.number] = rhs.reshape(rows, -1)
     columns = given
     threads = arguments.worker_count(workers)
@@ -268,7 +275,7 @@ def rolling_least_squares(
         with np.errstate(invalid="ignore"):  # infinite right-hand sides are no rows
             residuals = residuals + np.asarray(given - columns, dtype=np.float64)[::stride].T
     with np.errstate(over="ignore"):
-        rss = found.rss if weight is None else found.rss * largest
+        rss = found.rss if weight is None else found.rss * unit
 
     def some(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Return what is wanted, windows first."""

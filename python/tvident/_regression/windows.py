@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias, get_args
 
@@ -112,6 +113,12 @@ def half_life_given(
             f"{count:.3g} rows; use {regressors / 2 + 1:g} rows or more"
         )
     return half_life
+
+
+def unit_of_weights(weights: npt.NDArray[np.float64]) -> float:
+    """Return a power of four near weights: over it they lose no digit, nor do their roots, whichever of some weights it is near."""
+    largest = float(weights.max(initial=0.0))
+    return 4.0 ** ((math.frexp(largest)[1] - 1) // 2) if largest > 0 else 1.0
 
 
 def lags_given(lags: int | None, windows: RegressionWindows, *, is_correlated: bool, is_robust: bool) -> int | None:

@@ -10,7 +10,14 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
-from tvident._regression import MOST_REGRESSORS, Alignment, RegressionWindows, half_life_given, least_given
+from tvident._regression import (
+    MOST_REGRESSORS,
+    Alignment,
+    RegressionWindows,
+    half_life_given,
+    least_given,
+    unit_of_weights,
+)
 from tvident._stream.pieces import Stream
 
 
@@ -113,6 +120,12 @@ class RollingStream(Stream[StreamedRegression]):
     >>> stream.push(A[:100], b[:100]).params[[10, 49]].round(6)
     array([[nan, nan],
            [ 2.,  3.]])
+
+    Rows with the weights of their noise, which come with them:
+
+    >>> stream = tvident.RollingStream(50, alignment="trailing")
+    >>> stream.push(A[100:200], b[100:200], weights=np.ones(100)).params[-1].round(6)
+    array([2., 3.])
     """
 
     def __init__(
@@ -133,6 +146,7 @@ class RollingStream(Stream[StreamedRegression]):
         self._step = arguments.whole_number("step", step, least=1)
         self._shape: tuple[int, int] | None = None
         self._one_rhs = True
+        self._unit: float | None = None
         self._stream = self._begun(None)
 
     @property
@@ -155,7 +169,7 @@ class RollingStream(Stream[StreamedRegression]):
         """
         return 0 if self._stream is None else self._stream.rows
 
-    def push(self, A: npt.ArrayLike, b: npt.ArrayLike) -> StreamedRegression:
+    def push(self, A: npt.ArrayLike, b: npt.ArrayLike, *, weights: npt.ArrayLike | None = None) -> StreamedRegression:
         """Take the next rows, and give the windows that they complete.
 
         Parameters
@@ -164,6 +178,9 @@ class RollingStream(Stream[StreamedRegression]):
             Regressors of the next rows; shape (m,) beside as many numbers is one regressor.
         b : array_like, shape (m,) or (m, q), or a single number
             Right-hand sides.
+        weights : array_like, shape (m,), or a single number, optional
+            Weight of every row, as in :func:`rolling_least_squares`: not negative, and rows of weight 0 are not used. Rows of a stream all
+            have weights, or none has.
 
         Returns
         -------
@@ -174,7 +191,7 @@ class RollingStream(Stream[StreamedRegression]):
         ------
         ValueError
             If the stream has ended, lengths differ, there are other columns than before, not fewer than ``min_observations``, or as many as
-            the rows of which ``half_life`` leaves the weight.
+            the rows of which ``half_life`` leaves the weight, a weight is negative or no finite number, or only some rows have weights.
         TypeError
             If an array is complex or holds no numbers.
 
@@ -203,15 +220,25 @@ class RollingStream(Stream[StreamedRegression]):
             raise ValueError(
                 f"A and b must have as many rows as each other; got {regressors.shape[0]} and {rhs.shape[0]}; push them together"
             )
+        weight = None if weights is None else arguments.some_weights("weights", weights, rhs.shape[:1])
+        if self._stream is not None and (weight is None) != (self._unit is None):
+            raise ValueError(
+                f"rows of a stream must all have weights, or none of them; got some {'with' if weight is not None else 'without'} after "
+                f"others {'without' if weight is not None else 'with'}; give weights of 1 where all rows count the same"
+            )
         if self._stream is None:
             shape = _shape_of(regressors, rhs)
             windows = self._windows
             least_given(windows.at_least, windows.rows, shape[0])
             half_life_given(windows.half_life, 1.0, windows.alignment, windows.rows, shape[0])
             self._shape, self._one_rhs = shape, rhs.ndim == 1
+            self._unit = None if weight is None else unit_of_weights(weight)
             self._stream = self._begun(None)
         columns = rhs[:, np.newaxis] if rhs.ndim == 1 else rhs
-        return self._given(self._stream.push(regressors.T, columns.T))
+        if self._unit is None or weight is None:
+            return self._given(self._stream.push(regressors.T, columns.T))
+        with np.errstate(under="ignore"):
+            return self._given(self._stream.push(regressors.T, columns.T, weight / self._unit))
 
     def _check_end(self) -> None:
         """Check that rows have come."""
@@ -223,7 +250,9 @@ class RollingStream(Stream[StreamedRegression]):
         return (
             None
             if self._shape is None
-            else _core.RollingStream(self._windows.told(), *self._shape, step=self._step, state=state)
+            else _core.RollingStream(
+                self._windows.told(), *self._shape, weighted=self._unit is not None, step=self._step, state=state
+            )
         )
 
     def _given(self, settled: _core.StreamedRegressions) -> StreamedRegression:
@@ -233,6 +262,9 @@ class RollingStream(Stream[StreamedRegression]):
             params, stderr, rss = found.params[:, 0].T, found.stderr[:, 0].T, found.rss[0]
         else:
             params, stderr, rss = np.moveaxis(found.params, -1, 0), np.moveaxis(found.stderr, -1, 0), found.rss.T
+        if self._unit is not None:
+            with np.errstate(over="ignore"):
+                rss = rss * self._unit
         return StreamedRegression(row, params, stderr, rss, found.condition, found.status)
 
     def __repr__(self) -> str:

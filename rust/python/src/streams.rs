@@ -193,6 +193,7 @@ pub(crate) fn one(samples: &Bound<'_, PyUntypedArray>) -> PyResult<StridedSample
 pub(crate) struct RollingStream {
     regressors: usize,
     rhs_count: usize,
+    weighted: bool,
     step: usize,
     stream: Rolling,
 }
@@ -200,11 +201,12 @@ pub(crate) struct RollingStream {
 #[pymethods]
 impl RollingStream {
     #[new]
-    #[pyo3(signature = (windows, regressors, rhs_count, *, step=1, state=None))]
+    #[pyo3(signature = (windows, regressors, rhs_count, *, weighted=false, step=1, state=None))]
     fn new(
         windows: RowWindows,
         regressors: usize,
         rhs_count: usize,
+        weighted: bool,
         step: usize,
         state: Option<Stored<'_>>,
     ) -> PyResult<Self> {
@@ -213,12 +215,9 @@ impl RollingStream {
             None => RollingState::default(),
             Some((first, rows, given, ended)) => RollingState { first, rows: rows.as_slice()?.to_vec(), given, ended },
         };
-        Ok(Self {
-            regressors,
-            rhs_count,
-            step,
-            stream: Rolling::resume(plan, step, state).map_err(|error| exception(&error))?,
-        })
+        let stream = if weighted { Rolling::weighted(plan, step, state) } else { Rolling::resume(plan, step, state) };
+        let stream = stream.map_err(|error| exception(&error))?;
+        Ok(Self { regressors, rhs_count, weighted, step, stream })
     }
 
     /// Rows from one to its window.
@@ -239,11 +238,13 @@ impl RollingStream {
         (state.first, PyArray1::from_vec(py, state.rows), state.given, state.ended)
     }
 
-    /// Takes in rows, one row of each array a column, and returns the windows that they settle.
+    /// Takes in rows, one row of each array a column, with weights if the stream has them, and returns the windows that they settle.
+    #[pyo3(signature = (regressors, rhs, weights=None))]
     fn push(
         &mut self,
         regressors: &Bound<'_, PyUntypedArray>,
         rhs: &Bound<'_, PyUntypedArray>,
+        weights: Option<&Bound<'_, PyUntypedArray>>,
     ) -> PyResult<StreamedRegressions> {
         let py = regressors.py();
         let (regressors, rhs) = (records(regressors)?, records(rhs)?);
@@ -256,7 +257,11 @@ impl RollingStream {
                 rhs.len()
             )));
         }
-        let columns: Vec<StridedSamples> = regressors.into_iter().chain(rhs).collect();
+        if weights.is_some() != self.weighted {
+            return Err(PyTypeError::new_err("rows of a stream all have weights, or none has"));
+        }
+        let weights = weights.map(one).transpose()?;
+        let columns: Vec<StridedSamples> = regressors.into_iter().chain(rhs).chain(weights).collect();
         let count = columns.first().map_or(0, Samples::len);
         let given = self.stream.upcoming(count);
         let stream = &mut self.stream;

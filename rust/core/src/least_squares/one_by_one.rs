@@ -22,8 +22,12 @@ use crate::simd::vectors::{Kernel, Lanes, MOST_LANES, apart, dispatch, dispatch_
 pub(crate) trait RowSource {
     /// A row that exists: regressors, then right-hand sides.
     fn row(&self, row: usize) -> &[f64];
-    /// Numbers of the rows that hold an unusable value, in order.
+    /// Numbers of the rows that hold an unusable value, in order; those of weight zero are not among them.
     fn unusable(&self) -> &[usize];
+    /// The weight of a row that exists.
+    fn weight(&self, row: usize) -> f64;
+    /// Numbers of the rows of weight zero, in order.
+    fn without_weight(&self) -> &[usize];
 }
 
 /// Where the walk is, and its memory.
@@ -271,13 +275,14 @@ impl<H: Dimensions> OneByOneKernel<'_, '_, '_, H> {
         let (shape, plan, place) = (self.shape, self.run.plan, self.run.base + offset);
         let number = place.checked_sub(plan.window).filter(|number| self.run.rows.contains(number));
         let values = number.map(|number| self.source.row(number));
-        let usable = values.filter(|values| values.iter().all(|value| is_usable(*value)));
+        let own = number.map_or(0.0, |number| self.source.weight(number));
+        let usable = values.filter(|values| own > 0.0 && values.iter().all(|value| is_usable(*value)));
         for column in 0..shape.regressors() + shape.rhs_count() {
             row[column] = simd.splat_f64s(usable.map_or(0.0, |values| values[column]));
         }
         // What fades counts its rows, and those that are left out are none.
         let counts = if plan.at_least.is_some() { usable.is_some() } else { values.is_some() };
-        let weight = if plan.fading.is_some() && !counts { 0.0 } else { 1.0 };
+        let weight = if counts { own } else { 0.0 };
         let (block, offset) = (offset / plan.window, offset % plan.window);
         summary.append(simd, shape, plan, (offset, block), row, simd.splat_f64s(weight));
     }
@@ -299,11 +304,11 @@ impl<H: Dimensions> OneByOneKernel<'_, '_, '_, H> {
 
 /// How many rows of a window count.
 fn counted(run: &RollingRun<'_>, source: &dyn RowSource, window: usize) -> usize {
-    let spanned = run.spanned(window);
-    if run.plan.at_least.is_none() {
-        return spanned;
-    }
-    let before = |row: usize| source.unusable().partition_point(|&bad| bad < row);
     let first = window.saturating_sub(run.plan.window).max(run.rows.start);
-    spanned - before(window.min(run.rows.end)).saturating_sub(before(first))
+    let among = |rows: &[usize]| {
+        let before = |row: usize| rows.partition_point(|&bad| bad < row);
+        before(window.min(run.rows.end)).saturating_sub(before(first))
+    };
+    let missing = if run.plan.at_least.is_some() { among(source.unusable()) } else { 0 };
+    run.spanned(window) - missing - among(source.without_weight())
 }

@@ -20,6 +20,8 @@ use crate::stream::rows::RecentRows;
 pub struct RollingStream {
     plan: RollingLeastSquares,
     step: usize,
+    /// Whether every row comes with a weight, after its right-hand sides.
+    weighted: bool,
     /// The first row that is an equation, and the end of equations, once it is known.
     first: usize,
     end: Option<usize>,
@@ -58,12 +60,40 @@ impl RollingStream {
     /// # Errors
     /// As [`RollingStream::new`].
     pub fn resume(plan: RollingLeastSquares, step: usize, state: RollingState) -> Result<Self, Error> {
+        let columns = plan.columns();
+        Self::of_rows(plan, step, false, state.given, state.ended, RecentRows::new(columns, state.first, state.rows))
+    }
+
+    /// Begins a stream whose rows have weights, one more record beside the columns, or goes on from its state. Weights are finite and not
+    /// negative; rows of weight 0 are left out, whatever they hold.
+    ///
+    /// # Errors
+    /// As [`RollingStream::new`].
+    pub fn weighted(plan: RollingLeastSquares, step: usize, state: RollingState) -> Result<Self, Error> {
+        let columns = plan.columns() + 1;
+        Self::of_rows(
+            plan,
+            step,
+            true,
+            state.given,
+            state.ended,
+            RecentRows::weighted(columns, state.first, state.rows),
+        )
+    }
+
+    fn of_rows(
+        plan: RollingLeastSquares,
+        step: usize,
+        weighted: bool,
+        given: usize,
+        ended: bool,
+        rows: RecentRows,
+    ) -> Result<Self, Error> {
         plan.ask_for_scratch(1)?;
-        let (columns, walk) = (plan.columns(), OneByOne::new(&plan));
-        let rows = RecentRows::new(columns, state.first, state.rows);
-        let end = state.ended.then(|| rows.len());
-        let column = vec![Vec::new(); columns];
-        Ok(Self { plan, step, first: 0, end, rows, given: state.given, walk, side_by_side: None, column })
+        let walk = OneByOne::new(&plan);
+        let end = ended.then(|| rows.len());
+        let column = vec![Vec::new(); plan.columns() + usize::from(weighted)];
+        Ok(Self { plan, step, weighted, first: 0, end, rows, given, walk, side_by_side: None, column })
     }
 
     /// The same where equations begin with a row: those before it are ignored.
@@ -103,7 +133,7 @@ impl RollingStream {
         self.given..if self.end.is_some() { self.given } else { self.rows.len() }
     }
 
-    /// Takes in rows, one record a column, and gives the windows of [`RollingStream::upcoming`].
+    /// Takes in rows, one record a column and the weights last where there are any, and gives the windows of [`RollingStream::upcoming`].
     ///
     /// The elements of the outputs must begin with the first that is given.
     pub fn push(&mut self, columns: &[&dyn Samples], regressions: &mut Regressions<'_>) {
@@ -157,9 +187,10 @@ impl RollingStream {
         // A run of blocks side by side costs as much as one block alone, and lays out its rows.
         if wanted > plan.window() {
             let columns = rows.columns();
-            let columns = columns.iter().map(|column| column as &dyn Samples).collect();
+            let mut columns: Vec<&dyn Samples> = columns.iter().map(|column| column as &dyn Samples).collect();
+            let weights = if self.weighted { columns.pop() } else { None };
             let scratch = self.side_by_side.get_or_insert_with(|| plan.scratch());
-            plan.solve(&Equations { columns, weights: None, rows: equations }, around.clone(), regressions, scratch);
+            plan.solve(&Equations { columns, weights, rows: equations }, around.clone(), regressions, scratch);
         } else {
             plan.solve_one_by_one(rows, &equations, around.clone(), regressions, &mut self.walk);
         }

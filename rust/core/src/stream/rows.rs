@@ -6,18 +6,33 @@ use crate::record::samples::{Samples, is_usable};
 /// Rows that are still needed, row by row.
 #[derive(Clone, Debug)]
 pub(crate) struct RecentRows {
+    /// Numbers of a row, its weight included.
     columns: usize,
+    /// Whether the last number of a row is its weight.
+    weighted: bool,
     /// Number of the first row in `values`.
     first: usize,
     values: Vec<f64>,
     /// Numbers of the rows that hold an unusable value, in order.
     unusable: Vec<usize>,
+    /// Numbers of the rows of weight zero, in order.
+    without_weight: Vec<usize>,
 }
 
 impl RecentRows {
     /// Rows of so many columns from number `first` on.
     pub(crate) fn new(columns: usize, first: usize, values: Vec<f64>) -> Self {
-        let mut rows = Self { columns, first, values, unusable: Vec::new() };
+        Self::of(columns, false, first, values)
+    }
+
+    /// The same where the last column holds the weights.
+    pub(crate) fn weighted(columns: usize, first: usize, values: Vec<f64>) -> Self {
+        Self::of(columns, true, first, values)
+    }
+
+    fn of(columns: usize, weighted: bool, first: usize, values: Vec<f64>) -> Self {
+        let (unusable, without_weight) = (Vec::new(), Vec::new());
+        let mut rows = Self { columns, weighted, first, values, unusable, without_weight };
         rows.note_unusable(first);
         rows
     }
@@ -50,6 +65,7 @@ impl RecentRows {
             self.first += gone;
             let first = self.first;
             self.unusable.retain(|&bad| bad >= first);
+            self.without_weight.retain(|&row| row >= first);
         }
     }
 
@@ -59,22 +75,39 @@ impl RecentRows {
         (self.first + gone, &self.values[gone * self.columns..])
     }
 
-    /// Every column as a record.
+    /// Every column as a record; the weights are the last, where there are any.
     pub(crate) fn columns(&self) -> Vec<ColumnOf<'_>> {
         (0..self.columns).map(|column| ColumnOf { rows: self, column }).collect()
     }
 
+    /// One number of a row.
+    fn number(&self, row: usize, column: usize) -> f64 {
+        self.values[(row - self.first) * self.columns + column]
+    }
+
     fn note_unusable(&mut self, from: usize) {
         let place = (from - self.first) * self.columns;
-        let new = (from..).zip(self.values[place..].chunks_exact(self.columns));
-        self.unusable
-            .extend(new.filter(|(_, row)| !row.iter().all(|value| is_usable(*value))).map(|(number, _)| number));
+        for (number, row) in (from..).zip(self.values[place..].chunks_exact(self.columns)) {
+            if self.weighted && row[self.columns - 1] == 0.0 {
+                self.without_weight.push(number);
+            } else if !row.iter().all(|value| is_usable(*value)) {
+                self.unusable.push(number);
+            }
+        }
     }
 }
 
 impl RowSource for RecentRows {
     fn row(&self, row: usize) -> &[f64] {
-        &self.values[(row - self.first) * self.columns..][..self.columns]
+        &self.values[(row - self.first) * self.columns..][..self.columns - usize::from(self.weighted)]
+    }
+
+    fn weight(&self, row: usize) -> f64 {
+        if self.weighted { self.values[(row - self.first + 1) * self.columns - 1] } else { 1.0 }
+    }
+
+    fn without_weight(&self) -> &[usize] {
+        &self.without_weight
     }
 
     fn unusable(&self) -> &[usize] {
@@ -95,7 +128,7 @@ impl Samples for ColumnOf<'_> {
 
     fn read(&self, first: usize, into: &mut [f64]) {
         for (row, value) in (first..).zip(into) {
-            *value = if row < self.rows.first { 0.0 } else { self.rows.row(row)[self.column] };
+            *value = if row < self.rows.first { 0.0 } else { self.rows.number(row, self.column) };
         }
     }
 }
