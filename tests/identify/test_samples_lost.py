@@ -180,3 +180,41 @@ def test_records_of_a_batch_that_lack_little_are_as_alone() -> None:
     same = tvident.identify(np.stack([many["angle"]] * 2), np.stack([many["torque"]] * 2), sample_rate=1000)
     for place in (0, 1):
         assert np.array_equal(same.stiffness[place], alone[1].stiffness, equal_nan=True)
+
+
+@pytest.mark.parametrize("share", [0.01, 0.1])
+@pytest.mark.parametrize("seed", range(2))
+def test_polynomials_of_windows_that_lost_samples_are_fitted_on_what_is_there(share: float, seed: int) -> None:
+    rig = tvident.simulate_torsional_rig(duration=6.0, seed=seed)
+    angle, torque = np.asarray(rig.angle), np.asarray(rig.torque)
+    generator = np.random.default_rng(seed)
+    lost = [generator.random(angle.size) < share for _ in range(2)]
+    call: dict[str, Any] = {"sample_rate": 1000, "method": "paper"}
+    whole = tvident.identify(angle, torque, **call)
+    found = tvident.identify(np.where(lost[0], np.nan, angle), np.where(lost[1], np.nan, torque), **call)
+
+    def wrong(result: Any) -> float:
+        there = np.abs(result.stiffness / rig.stiffness - 1)[result.trusted]
+        return float(np.sqrt(np.mean(there**2)))
+
+    assert np.mean(found.trusted) > 0.98 * np.mean(whole.trusted)
+    assert wrong(found) < 1.1 * wrong(whole)
+    covered = np.abs(found.stiffness - rig.stiffness) < 1.96 * found.stderr["stiffness"]
+    assert np.mean(covered[found.trusted]) > 0.85
+
+
+def test_a_gap_changes_no_window_that_it_is_not_in() -> None:
+    rig = tvident.simulate_torsional_rig(duration=4.0, seed=3)
+    angle, torque = np.asarray(rig.angle), np.asarray(rig.torque)
+    gaps = angle.copy()
+    gaps[1000] = gaps[3000:3040] = np.nan
+    call: dict[str, Any] = {"sample_rate": 1000, "method": "paper"}
+    whole, found = tvident.identify(angle, torque, **call), tvident.identify(gaps, torque, **call)
+    reach = 100 + 100
+    far = np.ones(angle.size, dtype=bool)
+    far[1000 - reach : 1000 + reach + 1] = far[3000 - reach : 3040 + reach + 1] = False
+    np.testing.assert_allclose(found.stiffness[far], whole.stiffness[far], rtol=1e-9)
+    # Over one sample the motion is followed; around a gap of 40 there are no equations.
+    np.testing.assert_allclose(found.stiffness[900:1100], whole.stiffness[900:1100], rtol=0.02)
+    assert np.isnan(found.stiffness[3015:3025]).all()
+    assert (found.status[3015:3025] & tvident.Status.INVALID != 0).all()
