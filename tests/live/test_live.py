@@ -324,3 +324,11 @@ def test_a_real_outlet_loses_nothing_and_comes_back_with_the_stated_delay() -> N
     found = np.array([row[1] for row in came])
     assert np.nanmedian(np.abs(found[300:-300] - 15)) < 0.05
     assert not math.isnan(found[count // 2])
+
+
+def test_few_losses_by_a_counter_alone_are_no_wrong_rate() -> None:
+    clock = LiveClock(0.001)
+    for number in (count for count in range(1000) if count % 100):
+        clock.rows((math.nan, 1.0, 2.0), number)
+    assert clock.lost == 9
+    assert not any("more samples are missing" in said for said in clock.words())

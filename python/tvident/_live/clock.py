@@ -92,7 +92,7 @@ class LiveClock:
         self._next = 0
         self._expected = self._last = math.nan
         self._counter: int | None = None
-        self._highest = 0
+        self._highest = self._came = 0
         self.rate = Rate()
         self.lost = self.repeated = self.jumps = self.back = 0
 
@@ -186,7 +186,8 @@ class LiveClock:
         return found
 
     def _taken(self, row: Row) -> Row:
-        """Note a sample's stamp, and follow the clock with it."""
+        """Note a sample and its stamp, and follow the clock with it."""
+        self._came += 1
         if math.isfinite(row[0]):
             self.rate.see(self._next, row[0])
             if math.isnan(self._expected):
@@ -212,7 +213,7 @@ class LiveClock:
                     f"the rate differs by {drift / 1e4:+.2g} %: inertia is off by twice that; give --sample-rate {1 / period:.7g}"
                 )
         said.append(f"lost samples: {self.lost}")
-        if self.lost > self.rate.count:
+        if self.lost > self._came:
             said.append(
                 "more samples are missing than came: check the sample rate, and that times are in seconds or say their unit"
             )
