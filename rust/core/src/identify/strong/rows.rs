@@ -16,6 +16,9 @@ use crate::record::delayed::Delayed;
 use crate::record::samples::{Samples, is_usable};
 use crate::status::Status;
 
+/// Windows with gaps that are fitted before their estimates are put into columns: what is kept of each takes some hundred bytes.
+const TOGETHER: usize = 1 << 14;
+
 /// The angle and its derivatives, the torque without its lag, and what the polynomials say.
 pub(crate) struct Differentiated {
     pub(crate) derivatives: [Vec<f64>; 3],
@@ -170,13 +173,15 @@ fn fit_beside_gaps(
     }
     let record = Incomplete { samples, weights: None, parts: &parts, least: length.div_ceil(2) };
     let workers = stages.workers;
-    let found = stages.stage(|watch| plan.run_incomplete(&record, &places, workers, watch))?;
-    for (&place, estimate) in places.iter().zip(found) {
-        for (column, (value, _)) in derivatives.iter_mut().zip(&estimate.derivatives) {
-            column[place] = *value;
+    for places in places.chunks(TOGETHER) {
+        let found = stages.stage(|watch| plan.run_incomplete(&record, places, workers, watch))?;
+        for (&place, estimate) in places.iter().zip(found) {
+            for (column, (value, _)) in derivatives.iter_mut().zip(&estimate.derivatives) {
+                column[place] = *value;
+            }
+            // A sample that is there is no gap, though its window has one.
+            take(place, u8::try_from(estimate.order).unwrap_or(u8::MAX), estimate.status.bits() & !Status::GAP.bits());
         }
-        // A sample that is there is no gap, though its window has one.
-        take(place, u8::try_from(estimate.order).unwrap_or(u8::MAX), estimate.status.bits() & !Status::GAP.bits());
     }
     Ok(())
 }
