@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -183,6 +185,24 @@ def test_friction_and_a_spring_that_hardens_are_named_and_found(mass: int, term:
     assert abs(value - size) < 5 * error + 0.02 * size
     assert not cured.record_status & (Status.TERM_SUSPECTED | Status.NOISE_MODEL)
     assert max(wrong(cured, simulated).values()) < 5
+
+
+@pytest.mark.parametrize("lost", [0.01, *long(0.05)])
+def test_friction_beside_missing_samples_is_as_large(lost: float) -> None:
+    """Windows of the velocity with a gap counted as rest: .037 of .05 N m were left with a hundredth lost, and nothing with .05."""
+    simulated = chain([constant(12.0), constant(18.0)], 10000, seed=1)
+    velocity = np.gradient(simulated.angle[0])
+    torque = simulated.torque.copy()
+    torque[0] += 0.05 * np.sign(velocity)
+    angle = simulated.angle.copy()
+    angle[:, np.random.default_rng(0).random(angle.shape[1]) < lost] = np.nan
+    found = identified(replace(simulated, angle=angle), torque)
+    assert found.record_status & Status.TERM_SUSPECTED
+    told = next(
+        re.match(r"of mass 0: dry friction of ([\d.]+)", line) for line in found.advice if "dry friction" in line
+    )
+    assert told is not None
+    assert float(told[1]) == pytest.approx(0.05, rel=0.05)
 
 
 @pytest.mark.parametrize("seeds", [range(4), *long(range(4, 24))])

@@ -137,7 +137,7 @@ pub(crate) fn mean_weight(weights: &[f64], factors: &[f64]) -> f64 {
 }
 
 /// Bridges unusable samples by a line. Returns whether at least half of the samples are usable.
-fn bridge(samples: &mut [f64]) -> bool {
+pub(crate) fn bridge(samples: &mut [f64]) -> bool {
     if samples.iter().all(|&value| is_usable(value)) {
         return true;
     }

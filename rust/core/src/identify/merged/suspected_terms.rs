@@ -15,6 +15,7 @@ use crate::identify::merged::system::Multiplied;
 use crate::identify::weak::friction::{Sliding, expected_sign};
 use crate::identify::weak::shown_noise::MORE;
 use crate::inference::missing_terms::{JudgedTerm, Missing, Suspect};
+use crate::noise::spectrum::bridge;
 use crate::record::samples::read_around;
 use crate::regression::fit::Fit;
 use crate::regression::problem::Correlated;
@@ -136,8 +137,12 @@ impl MergedSession<'_, '_, '_> {
         for (number, trial) in self.merged.trials.iter().enumerate() {
             let mut samples = vec![0.0; trial.angles[equation].len()];
             if term.name == NAMES[0] {
-                let angle = trial.angles[equation];
-                let sliding = self.stages.stage(|watch| Sliding::of(angle, (delta, instructions), workers, watch))?;
+                // Equations near a gap ask for the direction there, too.
+                let mut angle = vec![0.0; samples.len()];
+                read_around(trial.angles[equation], 0, &mut angle);
+                bridge(&mut angle);
+                let angle = angle.as_slice();
+                let sliding = self.stages.stage(|watch| Sliding::of(&angle, (delta, instructions), workers, watch))?;
                 // At rest friction may be anything.
                 let signs =
                     sliding.velocity.iter().zip(&sliding.errors).map(|(&one, &error)| expected_sign(one, error));
