@@ -158,20 +158,6 @@ def test_windows_of_weighted_rows_are_those_of_the_batch(
         assert np.array_equal(found, getattr(batch, name), equal_nan=name != "status"), name
 
 
-def test_rows_of_a_stream_all_have_weights_or_none() -> None:
-    A, b = np.arange(40.0).reshape(20, 2) % 7, np.arange(20.0)
-    weighted, plain = tvident.RollingStream(9), tvident.RollingStream(9)
-    weighted.push(A, b, weights=np.zeros(20))
-    with pytest.raises(ValueError, match="must all have weights, or none of them; got some without after others with"):
-        weighted.push(A, b)
-    plain.push(A, b)
-    with pytest.raises(ValueError, match="got some with after others without"):
-        plain.push(A[0], b[0], weights=1.0)
-    with pytest.raises(ValueError, match=r"weights must be finite and not negative; weights\[1\] is -1"):
-        weighted.push(A[:2], b[:2], weights=[1, -1])
-    assert np.isfinite(weighted.push(A, b, weights=np.ones(20)).params[-1]).all()
-
-
 @settings(max_examples=examples(4))
 @given(PIECES, st.sampled_from([(201, 200), (51, 301), (301, 64)]), st.sampled_from([1, 5]), st.sampled_from([0, 7]))
 def test_windowed_parameters_are_those_of_the_batch(

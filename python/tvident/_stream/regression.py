@@ -44,6 +44,10 @@ class StreamedRegression:
     status: npt.NDArray[np.uint16]
 
 
+_MOST_WEIGHT = 1e100
+"""Times the first weights of a stream that later ones may be: sums of squares stay within the range of doubles."""
+
+
 class RollingStream(Stream[StreamedRegression]):
     """Solve least squares in windows of rows as they come: :func:`rolling_least_squares`, piece by piece.
 
@@ -146,7 +150,8 @@ class RollingStream(Stream[StreamedRegression]):
         self._step = arguments.whole_number("step", step, least=1)
         self._shape: tuple[int, int] | None = None
         self._one_rhs = True
-        self._unit: float | None = None
+        self._weighted = False
+        self._unit = 0.0
         self._stream = self._begun(None)
 
     @property
@@ -191,7 +196,8 @@ class RollingStream(Stream[StreamedRegression]):
         ------
         ValueError
             If the stream has ended, lengths differ, there are other columns than before, not fewer than ``min_observations``, or as many as
-            the rows of which ``half_life`` leaves the weight, a weight is negative or no finite number, or only some rows have weights.
+            the rows of which ``half_life`` leaves the weight, a weight is negative, no finite number or 1e100 times the
+            first ones, or only some rows have weights.
         TypeError
             If an array is complex or holds no numbers.
 
@@ -221,7 +227,7 @@ class RollingStream(Stream[StreamedRegression]):
                 f"A and b must have as many rows as each other; got {regressors.shape[0]} and {rhs.shape[0]}; push them together"
             )
         weight = None if weights is None else arguments.some_weights("weights", weights, rhs.shape[:1])
-        if self._stream is not None and (weight is None) != (self._unit is None):
+        if self._stream is not None and (weight is not None) != self._weighted:
             raise ValueError(
                 f"rows of a stream must all have weights, or none of them; got some {'with' if weight is not None else 'without'} after "
                 f"others {'without' if weight is not None else 'with'}; give weights of 1 where all rows count the same"
@@ -232,13 +238,25 @@ class RollingStream(Stream[StreamedRegression]):
             least_given(windows.at_least, windows.rows, shape[0])
             half_life_given(windows.half_life, 1.0, windows.alignment, windows.rows, shape[0])
             self._shape, self._one_rhs = shape, rhs.ndim == 1
-            self._unit = None if weight is None else unit_of_weights(weight)
+            self._weighted = weight is not None
             self._stream = self._begun(None)
         columns = rhs[:, np.newaxis] if rhs.ndim == 1 else rhs
-        if self._unit is None or weight is None:
-            return self._given(self._stream.push(regressors.T, columns.T))
+        return self._given(
+            self._stream.push(regressors.T, columns.T, None if weight is None else self._relative(weight))
+        )
+
+    def _relative(self, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Return weights over the unit of the first that are not zero."""
+        largest = float(weights.max(initial=0.0))
+        if self._unit == 0.0 and largest > 0.0:
+            self._unit = unit_of_weights(weights)
+        if largest > _MOST_WEIGHT * self._unit:
+            raise ValueError(
+                f"weights of a stream must be at most {_MOST_WEIGHT:.0e} times the first that are not 0; got {largest:.3g} after weights "
+                f"near {self._unit:.3g}; give all of them in one unit"
+            )
         with np.errstate(under="ignore"):
-            return self._given(self._stream.push(regressors.T, columns.T, weight / self._unit))
+            return weights / (self._unit or 1.0)
 
     def _check_end(self) -> None:
         """Check that rows have come."""
@@ -251,7 +269,7 @@ class RollingStream(Stream[StreamedRegression]):
             None
             if self._shape is None
             else _core.RollingStream(
-                self._windows.told(), *self._shape, weighted=self._unit is not None, step=self._step, state=state
+                self._windows.told(), *self._shape, weighted=self._weighted, step=self._step, state=state
             )
         )
 
@@ -262,9 +280,9 @@ class RollingStream(Stream[StreamedRegression]):
             params, stderr, rss = found.params[:, 0].T, found.stderr[:, 0].T, found.rss[0]
         else:
             params, stderr, rss = np.moveaxis(found.params, -1, 0), np.moveaxis(found.stderr, -1, 0), found.rss.T
-        if self._unit is not None:
+        if self._weighted:
             with np.errstate(over="ignore"):
-                rss = rss * self._unit
+                rss = rss * (self._unit or 1.0)
         return StreamedRegression(row, params, stderr, rss, found.condition, found.status)
 
     def __repr__(self) -> str:
