@@ -12,6 +12,7 @@ import pytest
 
 import tvident
 from parameters import long
+from tvident import Status
 from tvident._identify.improved import Improvement
 from tvident._results import predicted_ahead
 from tvident._results.recorded import Recorded
@@ -123,6 +124,22 @@ def test_what_is_missing_is_named(missing: dict[str, float], change: str, moved:
     assert "of what is held back are predicted, not " in first
     assert f" {moved} becomes " in first
     assert found.summary().startswith("do not trust: ")
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("seed", [1, *long(3)])
+@pytest.mark.parametrize("missing", [{"late": 3}, {"late": 1}, {"friction": 0.02}, {"friction": 0.1}], ids=str)
+def test_errors_hold_what_is_suspected_to_be_missing(missing: dict[str, Any], seed: int) -> None:
+    """Damping was up to 50 of its errors off, and said so by a flag alone."""
+    angle, torque = record(seed, **missing)
+    found = tvident.identify(angle, torque, sample_rate=RATE)
+    assert found.record_status & (Status.LAG_SUSPECTED if "late" in missing else Status.TERM_SUSPECTED)
+    assert found.settings["kinds"]["damping"] == "constant"
+    for name, true in (("inertia", INERTIA), ("damping", DAMPING)):
+        value, error, *_ = found.value(name)
+        assert abs(value - true) < 1.5 * error, name
+        # They tell something all the same.
+        assert error < true / 3, name
 
 
 @pytest.mark.parametrize(

@@ -13,14 +13,7 @@ from tvident._arguments import percent, with_error
 from tvident._equation import BUILT_IN, COEFFICIENTS
 from tvident._identify.growths import GROWTHS
 from tvident._identify.left_over import AS_GOOD, Left, Unexplained, unexplained
-from tvident._identify.offered import (
-    BEYOND_CHANCE,
-    are_distinguished,
-    can_be,
-    feeds_energy,
-    holds,
-    is_there,
-)
+from tvident._identify.offered import BEYOND_CHANCE, are_distinguished, can_be, feeds_energy, holds, is_there
 from tvident._results import BECOMES, Identification, median_of
 from tvident._status import DOUBTFUL_RECORD, Status
 
@@ -426,6 +419,9 @@ class Trial:
             if not isinstance(self.given[name], str) or found.settings["kinds"][name] == "known":
                 continue
             (before, error), (after, least) = median_of(self.result, name), median_of(found, name)
+            if kinds[name] == "constant" == found.settings["kinds"][name]:
+                # Errors beside something that is suspected hold what it changes, which is asked here.
+                error = least
             is_moved = abs(after - before) > max(_ELSEWHERE * np.hypot(error, least), _MATTERS * abs(after))
             is_settled = is_more and kinds[name] == "varying" and found.settings["kinds"][name] == "constant"
             if is_moved or is_settled:

@@ -91,6 +91,12 @@ struct ChannelKernels<'a> {
 }
 
 impl WeakRows {
+    /// Other rows of the same record and test function.
+    pub(crate) fn with(&self, rows: Rows) -> Self {
+        let Self { function, ref kernels, ref noise, ref torque, first, stride, .. } = *self;
+        Self { function, kernels: kernels.clone(), noise: noise.clone(), torque: torque.clone(), first, stride, rows }
+    }
+
     /// Number of rows of a record of so many samples.
     pub(crate) fn count(function: TestFunction, samples: usize) -> usize {
         (samples + function.stride()).saturating_sub(function.window_length()) / function.stride()

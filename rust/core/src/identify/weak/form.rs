@@ -378,7 +378,7 @@ impl Session<'_, '_, '_> {
         let ((chosen, decided, lag), before) = self.settled_with_followed(chosen, model)?;
         // What is followed explains that widths disagreed beside constants only where nothing is left.
         let before = before.filter(|_| decided.error >= BADLY);
-        let (mut found, at_rows) = self.report(chosen, &decided)?;
+        let (mut found, at_rows) = self.report(chosen, &decided, before.as_ref())?;
         found.scan = before.unwrap_or_else(|| std::mem::take(&mut self.scan));
         found.free_offset = self.free_offset;
         found.angle_zero = self.take_angle_zero(&mut found, &decided);

@@ -47,8 +47,8 @@ pub(crate) struct Fitted<'a> {
     pub(crate) errors: &'a Errors,
     /// Covariance and values of the constants, those that change slowly first.
     pub(crate) covariance: &'a [f64],
-    /// What each of them may be wrong by all along the record, which is part of the covariance; empty where nothing is known.
-    pub(crate) changes: &'a [f64],
+    /// What all of them may be wrong by together all along the record, for one reason and for another; each is part of the covariance.
+    pub(crate) changes: &'a [&'a [f64]],
     pub(crate) constants: &'a [f64],
 }
 
@@ -146,9 +146,8 @@ impl Session<'_, '_, '_> {
             }
             _ => 1.0,
         };
-        let change = |one: usize| changes.get(one).copied().unwrap_or(0.0);
         let between = |one: usize, other: usize, place: usize| {
-            let everywhere = change(one) * change(other);
+            let everywhere: f64 = changes.iter().map(|changes| changes[one] * changes[other]).sum();
             share(one, place) * share(other, place) * (covariance[one * count + other] - everywhere) + everywhere
         };
         let sensitive =

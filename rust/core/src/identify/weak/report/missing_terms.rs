@@ -26,42 +26,75 @@ const LEAST_LAG: f64 = 0.1;
 pub(crate) struct Suspected {
     pub(crate) each: Vec<Suspect>,
     pub(crate) with_lag: Vec<(usize, f64)>,
+    /// What the constants, those that change slowly first, would change by: with the lag, and with the most conspicuous term.
+    pub(crate) changes: Vec<Vec<f64>>,
+}
+
+/// What is conspicuous, and what the constants would change by with it.
+#[derive(Default)]
+struct Changes {
+    lag: Option<(Suspect, Vec<f64>)>,
+    term: Option<(Suspect, Vec<f64>)>,
+}
+
+impl Changes {
+    /// Takes a suspect, if it is conspicuous and, of two terms, the more so: both may have one cause.
+    fn add(&mut self, suspect: Suspect, by: Vec<f64>) {
+        let certainty = |one: &Suspect| (one.value / one.error).abs();
+        let place = if suspect.missing == Missing::Lag { &mut self.lag } else { &mut self.term };
+        let before = place.as_ref().map_or(CONSPICUOUS, |(before, _)| certainty(before));
+        if certainty(&suspect) > before {
+            *place = Some((suspect, by));
+        }
+    }
+
+    /// All of them, of so many constants. A lag's is that of its rate alone: fast motion that passes the test function turns by about so many radians in the
+    /// lag as there are half-widths in it, and `e^x - 1` is more than `x`.
+    fn finish(self, half_width: f64, constants: usize) -> Vec<Vec<f64>> {
+        let of_lag = self.lag.map(|(suspect, mut by)| {
+            let turn = (suspect.value / half_width).abs().clamp(f64::MIN_POSITIVE, 1.0);
+            for one in &mut by {
+                *one *= turn.exp_m1() / turn;
+            }
+            by
+        });
+        let all = of_lag.into_iter().chain(self.term.map(|(_, by)| by));
+        let all = all.inspect(|by| debug_assert_eq!(by.len(), constants, "constants"));
+        all.filter(|by| by.iter().all(|one| one.is_finite())).collect()
+    }
+}
+
+/// Rows of a record, or of some stretches of it, with what may be missing.
+struct RowsToJudge {
+    weak: WeakRows,
+    rhs: Vec<f64>,
+    /// The first regressor that may be missing, and that beside what varies slowly if there is one: the torque's rate, whose own is the one before it.
+    first: usize,
+    rate: usize,
+    /// What varies slowly follows a lag by, where that is known.
+    followed: Option<Vec<f64>>,
+    are_some: bool,
 }
 
 impl Session<'_, '_, '_> {
-    /// Looks for what may have been left out. The right-hand side and the windowed regressors times the covariance are those of all rows.
+    /// Looks for what may have been left out. The windowed regressors times the covariance are those of all rows.
     pub(crate) fn suspects(
         &mut self,
-        weak: &mut WeakRows,
+        all: &WeakRows,
         decided: &Decided,
         fit: &Fit,
-        (mut rhs, correlated): (Vec<f64>, Arc<Correlated>),
+        correlated: Arc<Correlated>,
         errors: &Errors,
     ) -> Result<Suspected, Error> {
         let mut candidates = self.candidates();
         // A term hardly matters where next to nothing is left for it to explain. A lag does: next to nothing of the torque may be much of the damping.
-        let is_explained = errors.is_explained(&weak.rows);
+        let is_explained = errors.is_explained(&all.rows);
         candidates.retain(|one| !is_explained || *one == Missing::Lag);
         if !self.options.diagnose || candidates.is_empty() {
             return Ok(Suspected::default());
         }
-        let stretches = stretches_to_judge(weak, decided, fit);
-        let more = self.regressors_of(&candidates, weak, stretches.as_deref())?;
-        let lag = match candidates.iter().position(|one| *one == Missing::Lag) {
-            Some(place) => self.lag_beside_slow(weak, &more[place], stretches.as_deref(), decided)?,
-            None => None,
-        };
-        if let Some(stretches) = &stretches {
-            (weak.rows, rhs) = (thinned_rows(&weak.rows, stretches), thinned_column(&rhs, stretches));
-        }
-        let first = weak.rows.regressors.len();
-        weak.rows.regressors.extend(more);
-        let rate = weak.rows.regressors.len();
-        let followed = lag.map(|Followed { left, by }| {
-            weak.rows.regressors.push(Regressor { value: left, ..weak.rows.regressors[rate - 1].clone() });
-            by
-        });
-        weak.rows.clear_unusable();
+        let RowsToJudge { mut weak, mut rhs, first, rate, followed, are_some } =
+            self.rows_to_judge(all, decided, fit, &candidates)?;
         // What the torque tells is told beside a lag that may be missing, not beside one that was found; another record's may be another.
         let found_lag = usize::from(self.options.found_lag && candidates.last() == Some(&Missing::Lag));
         let apart = candidates.iter().take_while(|missing| !missing.is_beside_torque()).count();
@@ -69,18 +102,18 @@ impl Session<'_, '_, '_> {
         if !is_explained {
             let (beside, regressors) =
                 (&candidates[apart..candidates.len() - found_lag], first + apart..rate - found_lag);
-            suspects = self.of_torque(weak, decided, (fit, &rhs, errors.error), regressors, beside)?;
+            suspects = self.of_torque(&weak, decided, (fit, &rhs, errors.error), regressors, beside)?;
         }
         if decided.white.is_some() {
             weak.rows = decided.as_white(std::mem::take(&mut weak.rows), &mut self.stages)?;
             rhs.clone_from(&weak.rows.rhs);
         }
-        let correlated = if stretches.is_none() && decided.white.is_none() {
+        let correlated = if !are_some && decided.white.is_none() {
             correlated
         } else {
             decided.model.correlated(&weak.rows, &errors.covariance, &mut self.stages)?
         };
-        let (mut with_lag, unknowns) = (Vec::new(), self.unknowns());
+        let (mut with_lag, mut changes, unknowns) = (Vec::new(), Changes::default(), self.unknowns());
         for (place, missing) in candidates.iter().enumerate().filter(|(_, missing)| !missing.is_of_torque()) {
             let is_lag = *missing == Missing::Lag;
             if is_lag && followed.is_none() {
@@ -100,7 +133,7 @@ impl Session<'_, '_, '_> {
                 instructions: self.options.instructions,
             };
             let found = judged.factors_and_changes(&[place], &mut self.stages)?;
-            let Some((factors, changes)) = found else { continue };
+            let Some((factors, by_one)) = found else { continue };
             let (value, error) = factors[0];
             // A term that is next to nothing of the torque need not be there; a lag is little of it, and much of the damping.
             let share = value * value * weak.rows.mean_square_of(place);
@@ -112,15 +145,53 @@ impl Session<'_, '_, '_> {
                 // What sums over samples leave of integrals.
                 continue;
             }
-            suspects.push(Suspect { missing: *missing, value: unit * value, error: unit.abs() * error });
-            if let (true, Some(by)) = (is_lag, &followed) {
-                // What varies slowly comes first.
-                let changes = by.iter().map(|by| -by).chain(changes.iter().copied());
-                let all = decided.ordered().constant.into_iter().zip(changes.map(|one| one / unit));
-                with_lag = all.filter(|(one, _)| unknowns.contains(one)).collect();
+            let suspect = Suspect { missing: *missing, value: unit * value, error: unit.abs() * error };
+            // What varies slowly comes first.
+            let slow: Vec<f64> = match &followed {
+                Some(by) if is_lag => by.iter().map(|by| -by).collect(),
+                _ => vec![0.0; decided.slow.len()],
+            };
+            let by_one: Vec<f64> = slow.into_iter().chain(by_one).collect();
+            if is_lag {
+                let each = decided.ordered().constant.into_iter().zip(by_one.iter().map(|one| one / unit));
+                with_lag = each.filter(|(one, _)| unknowns.contains(one)).collect();
             }
+            changes.add(suspect, by_one.into_iter().map(|one| value * one).collect());
+            suspects.push(suspect);
         }
-        Ok(Suspected { each: suspects, with_lag })
+        let changes = changes.finish(all.function.half_width() as f64, decided.ordered().constant.len());
+        Ok(Suspected { each: suspects, with_lag, changes })
+    }
+
+    /// The rows beside which what may be missing is judged, whose last regressors it is.
+    fn rows_to_judge(
+        &mut self,
+        all: &WeakRows,
+        decided: &Decided,
+        fit: &Fit,
+        candidates: &[Missing],
+    ) -> Result<RowsToJudge, Error> {
+        let stretches = stretches_to_judge(all, decided, fit);
+        let more = self.regressors_of(candidates, all, stretches.as_deref())?;
+        let lag = match candidates.iter().position(|one| *one == Missing::Lag) {
+            Some(place) => self.lag_beside_slow(all, &more[place], stretches.as_deref(), decided)?,
+            None => None,
+        };
+        let rhs = decided.rhs(&all.rows);
+        let (rows, rhs) = match &stretches {
+            Some(stretches) => (thinned_rows(&all.rows, stretches), thinned_column(rhs, stretches)),
+            None => (all.rows.clone(), rhs.to_vec()),
+        };
+        let mut weak = all.with(rows);
+        let first = weak.rows.regressors.len();
+        weak.rows.regressors.extend(more);
+        let rate = weak.rows.regressors.len();
+        let followed = lag.map(|Followed { left, by }| {
+            weak.rows.regressors.push(Regressor { value: left, ..weak.rows.regressors[rate - 1].clone() });
+            by
+        });
+        weak.rows.clear_unusable();
+        Ok(RowsToJudge { weak, rhs, first, rate, followed, are_some: stretches.is_some() })
     }
 
     /// What is left of the torque's rate where what varies slowly follows it, in the rows of some stretches or in all.
@@ -187,5 +258,41 @@ pub(crate) fn stretches_to_judge(weak: &WeakRows, decided: &Decided, fit: &Fit) 
         Some(scale) => stretches_of_rows(weak.rows.len()).filter(|_| holds(scale)),
         None if decided.model.windowed.is_empty() => more_stretches_of_rows(weak.rows.len()),
         None => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HALF_WIDTH: f64 = 10.0;
+
+    fn changes(of: &[(Missing, f64, Vec<f64>)]) -> Vec<Vec<f64>> {
+        let mut changes = Changes::default();
+        for (missing, value, by) in of {
+            changes.add(Suspect { missing: *missing, value: *value, error: 1.0 }, by.clone());
+        }
+        changes.finish(HALF_WIDTH, 2)
+    }
+
+    #[test]
+    fn the_lag_and_the_most_conspicuous_term_change_constants() {
+        let term = |place: usize| Missing::Term(&BUILT_IN_TERMS[place]);
+        let (little, much) = (vec![1.0, 0.0], vec![0.0, -3.0]);
+        let of_terms = changes(&[(term(0), 6.0, little.clone()), (term(1), -9.0, much.clone())]);
+        assert_eq!(of_terms, std::slice::from_ref(&much));
+        assert_eq!(changes(&[(term(0), 4.9, little.clone()), (Missing::Lag, f64::NAN, much.clone())]), [[0.0; 2]; 0]);
+        // As much again as half of the part of the half-width, and a sixth of its square, and so on.
+        let of_lag = changes(&[(Missing::Lag, -5.0, little.clone()), (Missing::Lag, -8.0, little.clone())]);
+        assert!((of_lag[0][0] - 0.8_f64.exp_m1() / 0.8).abs() < 4.0 * f64::EPSILON, "{of_lag:?}");
+        let both = changes(&[(Missing::Lag, 1e-9 * HALF_WIDTH, little.clone()), (term(0), 6.0, much.clone())]);
+        assert_eq!(both, [much]);
+        let longest = changes(&[(Missing::Lag, 1e3, little)]);
+        assert!((longest[0][0] - 1.0_f64.exp_m1()).abs() < 4.0 * f64::EPSILON, "{longest:?}");
+    }
+
+    #[test]
+    fn what_is_not_known_changes_nothing() {
+        assert_eq!(changes(&[(Missing::Lag, 6.0, vec![1.0, f64::NAN])]), [[0.0; 2]; 0]);
     }
 }

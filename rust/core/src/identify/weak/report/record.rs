@@ -28,13 +28,15 @@ use crate::status::Status;
 use crate::weak_form::weak_rows::WeakRows;
 
 impl Session<'_, '_, '_> {
-    /// What there is to say of a record, but for the numbers at its samples: those at the rows, for which nothing else is needed any more.
+    /// What there is to say of a record, but for the numbers at its samples: those at the rows, for which nothing else is needed any more. Another scan than
+    /// the last may be told of.
     pub(crate) fn report(
         &mut self,
         chosen: Chosen,
         decided: &Decided,
+        told: Option<&Scan>,
     ) -> Result<(WeakIdentified, Option<RowResults>), Error> {
-        let Chosen { mut weak, at_end, .. } = chosen;
+        let Chosen { weak, at_end, .. } = chosen;
         let stride = weak.stride;
         let ordered = decided.ordered();
         let mut found = WeakIdentified { width_from: self.width_from(at_end), ..self.nothing_yet(&weak, decided) };
@@ -54,8 +56,9 @@ impl Session<'_, '_, '_> {
         let Some(all) = all.as_deref() else { return Ok((self.undetermined(found, decided)?, None)) };
         found.condition = all.pooled.condition;
         found.weakest = weakest(&all.full, &all.pooled.weights);
-        let left;
-        (found.covariance, left) = self.covariance_of(&problem, &weak, decided, (fit, all), &errors)?;
+        let (covariance, left) = self.covariance_of(&problem, &weak, decided, (fit, all), &errors)?;
+        let mut changes: Vec<&[f64]> = left.iter().map(|left| left.changes.as_slice()).collect();
+        found.covariance = with_changes(covariance, &changes);
 
         let slow = decided.slow.len();
         let count = ordered.constant.len();
@@ -63,14 +66,17 @@ impl Session<'_, '_, '_> {
         values.extend(&fit.pooled.values);
         found.constants = constants(decided, &values, &found.covariance);
         found.filtered = left.as_ref().and_then(|left| filtered(left, &found.constants, slow));
-        found.unexplained = match explained {
-            Explained::Plainly => false,
-            Explained::NoTorque => true,
-            Explained::BesideOutliers | Explained::ByNothing => !self.is_moved_by(&found.constants),
-        };
+        found.unexplained = self.is_unexplained(explained, &found.constants);
         if found.unexplained && explained != Explained::BesideOutliers {
             let nothing = WeakIdentified { unexplained: true, jumps: Vec::new(), ..self.nothing_yet(&weak, decided) };
             return Ok((self.undetermined(nothing, decided)?, None));
+        }
+        let suspected = self.suspects(&weak, decided, fit, Arc::clone(&correlated), &errors)?;
+        // Where widths of the test function contradict the constants, these errors would only hide it.
+        if told.unwrap_or(&self.scan).status(&found.constants) == Status::GOOD {
+            changes.extend(suspected.changes.iter().map(Vec::as_slice));
+            found.covariance = with_changes(found.covariance, &changes[left.iter().len()..]);
+            found.constants = constants(decided, &values, &found.covariance);
         }
         found.constant_pairs = pairs_of(&ordered.constant, slow, &found.covariance);
         let (weakest, noise) = (&found.weakest, self.noise[0]);
@@ -99,16 +105,13 @@ impl Session<'_, '_, '_> {
             all,
             errors: &errors,
             covariance: &found.covariance,
-            changes: left.as_ref().map_or(&[], |left| left.changes.as_slice()),
+            changes: &changes,
             constants: &values,
         };
         let (results, OfAllRows { pairs, in_common }) = self.at_rows(&fitted, tracks)?;
         (found.pairs, found.in_common) = (pairs, in_common);
-        let rhs = decided.rhs(&weak.rows).to_vec();
-        let is_explained = errors.is_explained(&weak.rows);
-        let suspected = self.suspects(&mut weak, decided, fit, (rhs, correlated), &errors)?;
         (found.suspects, found.with_lag) = (suspected.each, suspected.with_lag);
-        found.late = late(self.options.lag, &found.suspects, is_explained);
+        found.late = late(self.options.lag, &found.suspects, errors.is_explained(&weak.rows));
         let contradicted = self.is_contradicted(&weak, &found.constants);
         forget_what_is_said(&mut found, contradicted);
         found.record_status = errors.status | record_status(&found, decided, at_end);
@@ -116,7 +119,7 @@ impl Session<'_, '_, '_> {
         Ok((found, Some(results)))
     }
 
-    /// The covariance of the constants, and what a lag leaves of a filter, if it does leave something.
+    /// The covariance of the constants from the noise, and what a lag leaves of a filter, if it does leave something.
     fn covariance_of(
         &mut self,
         problem: &Problem<'_>,
@@ -132,11 +135,7 @@ impl Session<'_, '_, '_> {
         for entry in &mut covariance {
             *entry *= errors.inflation;
         }
-        let left = self.left_of_filter(weak, decided, fit, errors)?;
-        if let Some(left) = &left {
-            add_changes(&mut covariance, &left.changes);
-        }
-        Ok((covariance, left))
+        Ok((covariance, self.left_of_filter(weak, decided, fit, errors)?))
     }
 
     /// Whether a constant differs between parts of the record. An offset that drifts by next to nothing of the torque, as noise of low
@@ -150,6 +149,15 @@ impl Session<'_, '_, '_> {
             one.test.as_ref().is_some_and(|test| test.probability < NO_CHANCE && matters(one, test.deviation))
         };
         constants.iter().any(differs)
+    }
+
+    /// Whether the torque is not explained, nor any constant of the motion found that is no chance.
+    fn is_unexplained(&self, explained: Explained, constants: &[Constant]) -> bool {
+        match explained {
+            Explained::Plainly => false,
+            Explained::NoTorque => true,
+            Explained::BesideOutliers | Explained::ByNothing => !self.is_moved_by(constants),
+        }
     }
 
     /// Where the test function came from, if the record chose it.
@@ -236,13 +244,16 @@ impl Session<'_, '_, '_> {
     }
 }
 
-/// Adds what the constants may be wrong by to their covariance, all at once.
-fn add_changes(covariance: &mut [f64], changes: &[f64]) {
-    for (one, change) in changes.iter().enumerate() {
-        for (other, with) in changes.iter().enumerate() {
-            covariance[one * changes.len() + other] += change * with;
+/// The covariance of the constants, with what they may be wrong by.
+fn with_changes(mut covariance: Vec<f64>, changes: &[&[f64]]) -> Vec<f64> {
+    for changes in changes {
+        for (one, change) in changes.iter().enumerate() {
+            for (other, with) in changes.iter().enumerate() {
+                covariance[one * changes.len() + other] += change * with;
+            }
         }
     }
+    covariance
 }
 
 /// Which channel is filtered, and the largest change of a constant, those that change slowly left out, as a part of it.
