@@ -187,6 +187,14 @@ def test_friction_and_a_spring_that_hardens_are_named_and_found(mass: int, term:
     assert max(wrong(cured, simulated).values()) < 5
 
 
+def test_terms_to_give_keep_the_kinds_that_were_given() -> None:
+    simulated = chain([constant(12.0), constant(18.0)], 10000, seed=1)
+    torque = simulated.torque.copy()
+    torque[0] += 0.05 * np.sign(np.gradient(simulated.angle[0]))
+    found = identified(simulated, torque, terms=[("offset", "windowed")])
+    assert any(line.endswith("give terms=[('offset', 'windowed'), 'coulomb']") for line in found.advice), found.advice
+
+
 @pytest.mark.parametrize("lost", [0.01, *long(0.05)])
 def test_friction_beside_missing_samples_is_as_large(lost: float) -> None:
     """Windows of the velocity with a gap counted as rest: .037 of .05 N m were left with a hundredth lost, and nothing with .05."""

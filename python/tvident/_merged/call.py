@@ -169,5 +169,6 @@ def identify_trials(trials: Trials, asked: AskedTogether, term_values: TermValue
             own=asked.own,
         ),
         terms=[name for name, _ in asked.terms],
+        kinds_of_terms={name: kind for name, kind in asked.terms if kind is not None},
     )
     return MergedIdentification(merging)

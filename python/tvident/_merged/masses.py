@@ -312,6 +312,7 @@ def identify_masses(trials: Sequence[Masses], asked: AskedTogether, term_values:
             own=asked.own,
         ),
         terms=[name for name, _ in asked.terms],
+        kinds_of_terms={name: kind for name, kind in asked.terms if kind is not None},
     )
     return MergedIdentification(merging)
 

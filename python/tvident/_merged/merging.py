@@ -69,6 +69,8 @@ class Merging:
         Whether it is from one time to another of what was recorded.
     terms : sequence of str
         Names of the terms, as asked for.
+    kinds_of_terms : mapping of str to str
+        Kinds of those that were given one.
     """
 
     elements: Sequence[Element]
@@ -85,6 +87,7 @@ class Merging:
     recorded: MergedRecorded | None = None
     is_part: bool = False
     terms: Sequence[str] = ()
+    kinds_of_terms: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def factors(self) -> frozenset[str]:

@@ -102,8 +102,10 @@ def _lacking_terms(part: Part, merging: Merging) -> list[str]:
     for equation, name, found in part.found.terms:
         whose = f"of mass {part.equations.numbers[equation]}: " if merging.masses else ""
         amount = f"{found.value:.3g} ± {found.stderr:.1g} {merging.units[name]}"
-        terms = [*dict.fromkeys([*merging.terms, *(other for _, other, _ in part.found.terms)])]
-        words.append(f"{whose}{BUILT_IN[name].suspected(found.value, amount)}: give terms={terms}")
+        terms = dict.fromkeys([*merging.terms, *(other for _, other, _ in part.found.terms)])
+        kinds = merging.kinds_of_terms
+        given = [(term, kinds[term]) if term in kinds else term for term in terms]
+        words.append(f"{whose}{BUILT_IN[name].suspected(found.value, amount)}: give terms={given}")
     return words
 
 
