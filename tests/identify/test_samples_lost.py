@@ -84,17 +84,20 @@ def test_a_rig_that_lost_samples_is_the_whole_rig(loss: tuple[float, int], seed:
 @pytest.mark.first(1)
 @pytest.mark.parametrize("loss", LOSSES)
 @pytest.mark.parametrize("seed", [1, *long(2, 3)])
+@pytest.mark.parametrize("more", [["viscous_asymmetric"], *long([])], ids=str)
 def test_a_carriage_that_lost_samples_is_the_whole_carriage(
-    folder_of_recordings: Path, loss: tuple[float, int], seed: int
+    folder_of_recordings: Path, more: list[str], loss: tuple[float, int], seed: int
 ) -> None:
     position, force = carriage(folder_of_recordings)
     t = np.arange(position.size) / 1000
-    whole = tvident.identify(position, force, sample_rate=1000, **OF_CARRIAGE)
+    asked = OF_CARRIAGE | {"terms": [*OF_CARRIAGE["terms"], *more]}
+    whole = tvident.identify(position, force, sample_rate=1000, **asked)
     for call in variants(t, position, force, loss, seed):
-        result = tvident.identify(**call, **OF_CARRIAGE)
+        result = tvident.identify(**call, **asked)
         for name, (value, stderr) in result.constants.items():
             assert abs(value - whole.constants[name][0]) < 2 * stderr, name
-            assert stderr < 2.5 * whole.constants[name][1], name
+            # Its friction differs between the directions: without that, errors hold what it changes, more where one direction lost more.
+            assert not more or stderr < 1.5 * whole.constants[name][1], name
 
 
 @pytest.mark.parametrize("seed", [1, *long(2)])

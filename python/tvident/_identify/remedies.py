@@ -41,14 +41,9 @@ _ELSEWHERE = 3.0
 _MATTERS = 0.01
 """A share of a parameter by which it must move to be told."""
 
-_LEFT_OVER = (
-    Status.RANK_DEFICIENT
-    | Status.ILL_CONDITIONED
-    | Status.NOISE_MODEL
-    | Status.TERM_SUSPECTED
-    | Status.LAG_SUSPECTED
-    | Status.CHANNEL_SUSPECTED
-)
+_SUSPECTED = Status.TERM_SUSPECTED | Status.LAG_SUSPECTED
+
+_LEFT_OVER = Status.RANK_DEFICIENT | Status.ILL_CONDITIONED | Status.NOISE_MODEL | _SUSPECTED | Status.CHANNEL_SUSPECTED
 """Flags of a record whose equations leave something over, or tell nothing apart."""
 
 _CONTRADICTED = _LEFT_OVER | Status.SCALES_DISAGREE | Status.KIND_CONTRADICTED
@@ -419,7 +414,7 @@ class Trial:
             if not isinstance(self.given[name], str) or found.settings["kinds"][name] == "known":
                 continue
             (before, error), (after, least) = median_of(self.result, name), median_of(found, name)
-            if kinds[name] == "constant" == found.settings["kinds"][name]:
+            if kinds[name] == found.settings["kinds"][name] and self.result.record_status & _SUSPECTED:
                 # Errors beside something that is suspected hold what it changes, which is asked here.
                 error = least
             is_moved = abs(after - before) > max(_ELSEWHERE * np.hypot(error, least), _MATTERS * abs(after))
