@@ -79,15 +79,25 @@ def test_derivatives_are_those_of_the_batch(
     assert np.allclose(joined(outs, "time"), np.arange(0, y.size, step) / 100)
 
 
+SHAPES = (st.integers(1, 5), st.integers(1, 2), st.sampled_from([9, 64, 300]))
+"""Regressors, right-hand sides and rows of a window."""
+TOLD = st.tuples(st.sampled_from(get_args(Alignment)), st.sampled_from([None, 6, 9]), st.sampled_from([None, 30.0]))
+"""Alignment, fewest rows and half-life."""
+
+
+def assert_same_windows(outs: Sequence[Any], batch: tvident.RollingRegression) -> None:
+    for name in ("params", "stderr", "rss", "condition", "status"):
+        found = np.concatenate([getattr(out, name) for out in outs])
+        assert np.array_equal(found, getattr(batch, name), equal_nan=name != "status"), name
+
+
 @settings(max_examples=examples(12))
 @given(
     PIECES,
-    st.integers(1, 5),
-    st.integers(1, 2),
-    st.sampled_from([9, 64, 300]),
+    *SHAPES,
     st.sampled_from([1, 4]),
     st.sampled_from([0, 7]),
-    st.tuples(st.sampled_from(get_args(Alignment)), st.sampled_from([None, 6, 9]), st.sampled_from([None, 30.0])),
+    TOLD,
 )
 def test_windows_of_rows_are_those_of_the_batch(
     lengths: list[int],
@@ -110,20 +120,16 @@ def test_windows_of_rows_are_those_of_the_batch(
     assert stream.delay == {"centre": window - 1 - window // 2, "trailing": 0, "leading": window - 1}[alignment]
     outs = streamed(stream, 1000, lengths, lambda one, piece: one.push(A[piece], b[piece]), resume)
     batch = tvident.rolling_least_squares(A, b, window, **options)
-    for name in ("params", "stderr", "rss", "condition", "status"):
-        found = np.concatenate([getattr(out, name) for out in outs])
-        assert np.array_equal(found, getattr(batch, name), equal_nan=name != "status"), name
+    assert_same_windows(outs, batch)
     assert np.array_equal(np.concatenate([out.row for out in outs]), np.arange(0, 1000, step))
 
 
 @settings(max_examples=examples(12))
 @given(
     PIECES,
-    st.integers(1, 5),
-    st.integers(1, 2),
-    st.sampled_from([9, 64, 300]),
+    *SHAPES,
     st.sampled_from([0, 7]),
-    st.tuples(st.sampled_from(get_args(Alignment)), st.sampled_from([None, 6, 9]), st.sampled_from([None, 30.0])),
+    TOLD,
     st.sampled_from([1.0, 3e-7, 1e200]),
 )
 def test_windows_of_weighted_rows_are_those_of_the_batch(
@@ -153,9 +159,7 @@ def test_windows_of_weighted_rows_are_those_of_the_batch(
         stream, 1000, lengths, lambda one, piece: one.push(A[piece], b[piece], weights=weights[piece]), resume
     )
     batch = tvident.rolling_least_squares(A, b, window, weights=weights, **options)
-    for name in ("params", "stderr", "rss", "condition", "status"):
-        found = np.concatenate([getattr(out, name) for out in outs])
-        assert np.array_equal(found, getattr(batch, name), equal_nan=name != "status"), name
+    assert_same_windows(outs, batch)
 
 
 @settings(max_examples=examples(4))

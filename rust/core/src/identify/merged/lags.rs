@@ -49,7 +49,7 @@ impl MergedSession<'_, '_, '_> {
             (self.merged.equations()..self.merged.channels()).filter(|&one| self.pulls_springs(one)).collect();
         let first = self.all.rows.regressors.len();
         for &equation in &equations {
-            let rate = self.rate_of_torque(equation)?;
+            let rate = self.column_of(equation, &vec![TermSamples::TorqueRate; self.merged.trials.len()])?;
             self.all.rows.regressors.push(rate);
         }
         for derivative in [1, 0] {
@@ -168,19 +168,19 @@ impl MergedSession<'_, '_, '_> {
         Regressor { companion: vec![0.0; rows.len()], value, noise }
     }
 
-    /// The rate of the torque of an equation, in its rows.
-    fn rate_of_torque(&mut self, equation: usize) -> Result<Regressor, Error> {
+    /// What a term adds to the torque of an equation, in its rows: by trial, what it is.
+    pub(crate) fn column_of(&mut self, equation: usize, terms: &[TermSamples<'_>]) -> Result<Regressor, Error> {
         let (rows, equations, group) = (self.all.rows.len(), self.merged.equations(), self.all.group);
         let (function, delta, workers) = (self.all.function, self.options.delta, self.stages.workers);
         let mut value = vec![0.0; rows];
-        for (number, trial) in self.merged.trials.iter().enumerate() {
+        for (number, (trial, term)) in self.merged.trials.iter().zip(terms).enumerate() {
             let record = Record {
                 angle: trial.angles[equation.min(trial.angles.len() - 1)],
                 torque: trial.torques[equation],
                 noise: None,
                 coefficients: [Coefficient::Unknown; 3],
                 constant: [true; 3],
-                terms: vec![TermSamples::TorqueRate],
+                terms: vec![*term],
                 constant_terms: true,
                 lag: 0.0,
                 angle_zero: 0.0,
@@ -189,14 +189,14 @@ impl MergedSession<'_, '_, '_> {
             };
             let weak = self.stages.stage(|watch| WeakRows::build(&record, function, delta, None, workers, watch))?;
             let weight = self.weights.equations[equation];
-            for (time, rate) in weak.rows.regressors[3].value.iter().enumerate() {
+            for (time, term) in weak.rows.regressors[3].value.iter().enumerate() {
                 let row = time * group + number * equations + equation;
                 if row < rows && self.all.rows.usable[row] {
-                    value[row] = weight * rate;
+                    value[row] = weight * term;
                 }
             }
         }
-        // The noise of angles does not enter.
+        // The noise of angles hardly enters, if at all.
         let noise = self.all.rows.regressors[0].noise.each_ref().map(|kernel| vec![0.0; kernel.len()]);
         Ok(Regressor { companion: vec![0.0; rows], value, noise })
     }

@@ -3,7 +3,6 @@
 
 use std::sync::Arc;
 
-use crate::equation::motion::Coefficient;
 use crate::equation::rows::Regressor;
 use crate::equation::terms::BuiltInTerm;
 use crate::error::Error;
@@ -20,7 +19,7 @@ use crate::record::samples::read_around;
 use crate::regression::fit::Fit;
 use crate::regression::problem::Correlated;
 use crate::regression::residuals::residuals;
-use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows};
+use crate::weak_form::weak_rows::TermSamples;
 
 /// What may be lacking: functions of the velocity of a mass and of its angle.
 const NAMES: [&str; 2] = ["coulomb", "cubic"];
@@ -106,7 +105,10 @@ impl MergedSession<'_, '_, '_> {
                 continue;
             }
             for missing in NAMES.iter().filter_map(|name| BuiltInTerm::named(name)) {
-                let regressor = self.column_of(equation, missing)?;
+                let samples = self.samples_of(equation, missing)?;
+                let samples: Vec<&[f64]> = samples.iter().map(Vec::as_slice).collect();
+                let terms: Vec<_> = samples.iter().map(|one| TermSamples::Given(one)).collect();
+                let regressor = self.column_of(equation, &terms)?;
                 if !self.is_given(equation, &regressor) {
                     candidates.push(PossibleTerm {
                         equation,
@@ -128,60 +130,26 @@ impl MergedSession<'_, '_, '_> {
         })
     }
 
-    /// A term of the angle and the velocity of a mass, in the rows of its equation.
-    fn column_of(&mut self, equation: usize, term: &'static BuiltInTerm) -> Result<Regressor, Error> {
-        let (rows, equations, group) = (self.all.rows.len(), self.merged.equations(), self.all.group);
-        let (function, delta, workers) = (self.all.function, self.options.delta, self.stages.workers);
-        let instructions = self.options.instructions;
-        let mut value = vec![0.0; rows];
-        for (number, trial) in self.merged.trials.iter().enumerate() {
-            let mut samples = vec![0.0; trial.angles[equation].len()];
-            if term.name == NAMES[0] {
-                // Equations near a gap ask for the direction there, too.
-                let mut angle = vec![0.0; samples.len()];
-                read_around(trial.angles[equation], 0, &mut angle);
-                bridge(&mut angle);
-                let angle = angle.as_slice();
-                let sliding = self.stages.stage(|watch| Sliding::of(&angle, (delta, instructions), workers, watch))?;
-                // At rest friction may be anything.
-                let signs =
-                    sliding.velocity.iter().zip(&sliding.errors).map(|(&one, &error)| expected_sign(one, error));
-                samples
-                    .iter_mut()
-                    .zip(signs)
-                    .for_each(|(sample, sign)| *sample = if sign.is_nan() { 0.0 } else { sign });
-            } else {
-                read_around(trial.angles[equation], 0, &mut samples);
-                for sample in &mut samples {
-                    *sample = sample.powi(3);
-                }
+    /// A term of the angle or the velocity of an equation's mass at every sample, by trial.
+    fn samples_of(&mut self, equation: usize, term: &'static BuiltInTerm) -> Result<Vec<Vec<f64>>, Error> {
+        let (delta, workers, instructions) = (self.options.delta, self.stages.workers, self.options.instructions);
+        let mut all = Vec::new();
+        for trial in &self.merged.trials {
+            let mut angle = vec![0.0; trial.angles[equation].len()];
+            read_around(trial.angles[equation], 0, &mut angle);
+            if term.name != NAMES[0] {
+                all.push(angle.into_iter().map(|angle| angle.powi(3)).collect());
+                continue;
             }
-            let samples = samples.as_slice();
-            let record = Record {
-                angle: trial.angles[equation],
-                torque: trial.torques[equation],
-                noise: None,
-                coefficients: [Coefficient::Unknown; 3],
-                constant: [true; 3],
-                terms: vec![TermSamples::Given(&samples)],
-                constant_terms: true,
-                lag: 0.0,
-                angle_zero: 0.0,
-                mask: trial.mask,
-                weights: trial.weights,
-            };
-            let weak = self.stages.stage(|watch| WeakRows::build(&record, function, delta, None, workers, watch))?;
-            let weight = self.weights.equations[equation];
-            for (time, term) in weak.rows.regressors[3].value.iter().enumerate() {
-                let row = time * group + number * equations + equation;
-                if row < rows && self.all.rows.usable[row] {
-                    value[row] = weight * term;
-                }
-            }
+            // Equations near a gap ask for the direction there, too.
+            bridge(&mut angle);
+            let angle = angle.as_slice();
+            let sliding = self.stages.stage(|watch| Sliding::of(&angle, (delta, instructions), workers, watch))?;
+            let signs = sliding.velocity.iter().zip(&sliding.errors).map(|(&one, &error)| expected_sign(one, error));
+            // At rest friction may be anything.
+            all.push(signs.map(|sign| if sign.is_nan() { 0.0 } else { sign }).collect());
         }
-        // The noise of angles hardly enters.
-        let noise = self.all.rows.regressors[0].noise.each_ref().map(|kernel| vec![0.0; kernel.len()]);
-        Ok(Regressor { companion: vec![0.0; rows], value, noise })
+        Ok(all)
     }
 
     /// Whether one of the terms of an equation is nearly a multiple of a column.
