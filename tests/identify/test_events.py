@@ -170,6 +170,24 @@ def test_a_gain_that_drifts_is_no_change_of_the_machine(damping: float, seed: in
     assert said.startswith("inertia, damping and stiffness" if named else "inertia and stiffness")
 
 
+@pytest.mark.first(1)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_gain_that_drifts_is_told_from_damping_and_stiffness_where_the_inertia_changes_too(seed: int) -> None:
+    heavier = tvident.simulate_torsional_rig(
+        20.0,
+        seed=seed,
+        pattern="constant",
+        damping=0.041,
+        angle_noise=1e-3,
+        inertia=lambda t: 0.0123 * (1 + 0.3 * t / 20.0),
+    )
+    result = tvident.identify(heavier.angle, heavier.torque * (1 + 0.2 * heavier.time / 20.0), sample_rate=RATE)
+    (said,) = [advice for advice in result.advice if "by one factor" in advice]
+    assert said.startswith("damping and stiffness")
+    assert "beside an inertia that changes" in said
+    assert result.record_status & Status.CHANNEL_SUSPECTED
+
+
 @pytest.mark.long
 def test_a_heavier_machine_is_no_gain_that_drifts() -> None:
     heavier = tvident.simulate_torsional_rig(

@@ -106,7 +106,7 @@ class Gains:
         return float((after - before) / mean), float(one.factor * math.hypot(*one.stderr[sides]) / abs(mean))
 
     def _drift(self) -> list[str]:
-        """Return that a gain may drift, where inertia and another one change by one factor."""
+        """Return that a gain may drift, where inertia and another one change by one factor, or damping and stiffness."""
         changing = self._changing()
         if not {"inertia", "stiffness"} <= set(changing):
             return []
@@ -114,27 +114,36 @@ class Gains:
         if not there.any():
             return []
         errors = {name: one.stderr * one.factor / abs(np.mean(one.values[there])) for name, one in changing.items()}
+        # An inertia may change beside a gain, too; then damping and stiffness tell.
+        return self._following("inertia", there, errors) or self._following("stiffness", there, errors)
+
+    def _following(
+        self, first: str, there: npt.NDArray[np.bool_], errors: Mapping[str, npt.NDArray[np.float64]]
+    ) -> list[str]:
+        """Return that a gain may drift, where others change by the factor of the first."""
         # Near the ends little is known, and curves go astray.
-        known = there & (errors["inertia"] <= _AS_KNOWN * np.median(errors["inertia"][there]))
-        changes = {name: one.values[known] / np.mean(one.values[known]) - 1 for name, one in changing.items()}
+        known = there & (errors[first] <= _AS_KNOWN * np.median(errors[first][there]))
+        of = {name: one.values[known] for name, one in self._changing().items()}
+        changes = {name: values / np.mean(values) - 1 for name, values in of.items()}
         error = {name: _root_mean_square(one[known]) for name, one in errors.items()}
-        inertia = changes["inertia"]
-        change = _root_mean_square(inertia)
-        if not change > max(_CHANGES, _BEYOND_CHANCE * error["inertia"]):
+        by = changes[first]
+        change = _root_mean_square(by)
+        if not change > max(_CHANGES, _BEYOND_CHANCE * error[first]):
             return []
         follow = []
         # Damping is known worst, and says nothing where its errors are nearly as large as what changes.
-        if "damping" in changing and error["damping"] < change / _CLEARLY:
-            away = _root_mean_square(changes["damping"] - inertia)
+        if "damping" in changes and error["damping"] < change / _CLEARLY:
+            away = _root_mean_square(changes["damping"] - by)
             follow += ["damping"] if away < _AGREES * error["damping"] else []
         # A stiffness may change of its own, too; then damping tells.
-        if _root_mean_square(changes["stiffness"] - inertia) < _ONE_FACTOR * change:
+        if first == "inertia" and _root_mean_square(changes["stiffness"] - by) < _ONE_FACTOR * change:
             follow += ["stiffness"]
         if not follow:
             return []
+        rather = _RATHER[len(follow)] + ("" if first == "inertia" else ", beside an inertia that changes")
         words = (
-            f"{listed(['inertia', *follow])} change by one factor ({np.min(inertia):+.1%} to {np.max(inertia):+.1%}): the gain of the "
-            f"torque or of the angle seems to drift or jump, rather than {_RATHER[len(follow)]}: {_TRUSTED}"
+            f"{listed(sorted([first, *follow], key=COEFFICIENTS.index))} change by one factor ({np.min(by):+.1%} to {np.max(by):+.1%}): "
+            f"the gain of the torque or of the angle seems to drift or jump, rather than {rather}: {_TRUSTED}"
         )
         return [words]
 
