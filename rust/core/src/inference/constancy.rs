@@ -12,7 +12,8 @@
 //! these: what a window takes, every block loses. Its slope over its standard error has one degree of freedom, where eight blocks have seven.
 //!
 //! Where no torque acts the equation is homogeneous: in a free decay, or at rest, it holds for any multiple of the parameters, and least squares finds
-//! the smallest, zero. Parts whose torque is no more than its noise are left out, and of a block the longest run of others stands for it.
+//! the smallest, zero. Parts whose torque is no more than its noise are left out, and of a block the longest run of others stands for it. Where a hammer
+//! strikes now and then, the torque of most samples is noise in every part: a block that is struck stands as it is, as what rings was set in motion there.
 
 use std::ops::Range;
 
@@ -21,6 +22,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
+use crate::inference::drive::{Drive, drive, longest_run};
 use crate::noise::median::{MEDIAN_OF_SQUARES, median};
 use crate::regression::constants::{Expected, pool};
 use crate::regression::fit::Fit;
@@ -42,10 +44,6 @@ const FREEDOM: f64 = 10.0;
 
 /// Parts that say how much neighbours scatter, at least; so many must be driven.
 const FEWEST_DRIVEN: usize = 2 * PARTS;
-
-/// Standard deviations by which the median of squares of noise is larger by chance, and one of them for a single square, over the median.
-const FREE: f64 = 5.0;
-const SCATTER_OF_MEDIAN: f64 = 2.34;
 
 /// Probability below which a difference is significant: once in 2000 records.
 pub const NO_CHANCE: f64 = 5e-4;
@@ -185,13 +183,15 @@ pub(crate) fn test(
     let piece = |rows: Range<usize>| Piece { size: rows.len(), content: rows };
     let at = |index: usize| index * rows / (BLOCKS * PARTS);
     let part = |index: usize| at(index)..at(index + 1);
-    let free: Vec<bool> =
-        (0..BLOCKS * PARTS).map(|index| is_free(problem, (&part(index), equations), expected, inflation)).collect();
+    let drives = |rows: Range<usize>| drive(problem, (&rows, equations), expected, inflation);
+    let free: Vec<bool> = (0..BLOCKS * PARTS).map(|index| drives(part(index)) != Drive::Always).collect();
     // One alone is between two movements.
     let is_alone = |index: usize| !(index > 0 && free[index - 1] || free.get(index + 1) == Some(&true));
     let driven: Vec<bool> = (0..free.len()).map(|index| !free[index] || is_alone(index)).collect();
     let blocks = (0..BLOCKS).map(|block| PARTS * block..PARTS * (block + 1));
-    let runs = blocks.filter_map(|parts| longest_run(&driven, parts)).map(|run| piece(at(run.start)..at(run.end)));
+    let struck = |parts: &Range<usize>| drives(at(parts.start)..at(parts.end)) != Drive::Never;
+    let stands = |parts: Range<usize>| longest_run(&driven, parts.clone()).or_else(|| Some(parts).filter(struck));
+    let runs = blocks.filter_map(stands).map(|run| piece(at(run.start)..at(run.end)));
     let estimates = stages.map(runs.collect(), || (), estimate)?;
     let of = |estimates: &[Estimate], constant: usize| -> Vec<(f64, f64)> {
         estimates.iter().flatten().map(|(values, variances)| (values[constant], variances[constant])).collect()
@@ -209,39 +209,6 @@ pub(crate) fn test(
         }
     }
     Ok(tests)
-}
-
-/// The longest run of places that hold, among some.
-fn longest_run(holds: &[bool], places: Range<usize>) -> Option<Range<usize>> {
-    let end = |first: usize| (first..places.end).find(|&place| !holds[place]).unwrap_or(places.end);
-    let runs = places.clone().map(|first| first..end(first)).filter(|run| !run.is_empty());
-    // Of equally long ones the first.
-    runs.rev().max_by_key(Range::len)
-}
-
-/// Whether no torque acts in most of some rows of every equation: about its median there, which an offset takes, it is within chance of its
-/// noise.
-fn is_free(
-    problem: &Problem<'_>,
-    (rows, equations): (&Range<usize>, usize),
-    expected: Expected,
-    inflation: f64,
-) -> bool {
-    let of = |equation: usize| {
-        let used = || {
-            let rows = rows.clone().filter(move |row| row % equations == equation);
-            rows.filter(|&row| problem.usable[row] && problem.root(row) > 0.0)
-        };
-        let mut torques: Vec<f64> = used().map(|row| problem.rhs[row] / problem.root(row)).collect();
-        let torque = median(&mut torques)?;
-        let square = |row: usize| (problem.rhs[row] - torque * problem.root(row)).powi(2);
-        let mut squares: Vec<f64> = used().map(square).collect();
-        let scattered = SCATTER_OF_MEDIAN * (expected.variance_inflation / squares.len() as f64).sqrt();
-        let most = MEDIAN_OF_SQUARES * (1.0 + FREE * scattered) * inflation * expected.torque;
-        median(&mut squares).map(|square| square <= most)
-    };
-    let each: Vec<bool> = (0..equations).filter_map(of).collect();
-    !each.is_empty() && each.iter().all(|free| *free)
 }
 
 /// The constants of some rows as if there were no others, and their covariance: in windows as long as they are, or in the longest that jumps
@@ -375,14 +342,45 @@ mod tests {
 
     #[test]
     fn parts_without_torque_say_nothing_of_constants() {
-        assert_eq!(longest_run(&[true, false, true, true, false, true, true], 0..7), Some(2..4));
-        assert_eq!(longest_run(&[true, false, true, true], 0..2), Some(0..1));
-        assert_eq!(longest_run(&[true, false, true], 1..2), None);
         let first = |growth: f64, free: usize| tests_of(growth, NoiseFrom::Channels, free)[0].clone();
         assert_eq!(first(0.0, 800).expect("four blocks").freedom, 3);
         assert!(first(0.0, 800).expect("four blocks").probability > 1e-3);
         assert!(first(0.3, 800).expect("four blocks").probability < NO_CHANCE);
         assert_eq!(first(0.3, 1600), None);
+    }
+
+    /// What is said of a constant that grows by some part over the record, where the machine is moved for a fifth of the time only, in short blows.
+    fn beside_blows(growth: f64) -> Option<Test> {
+        use crate::regression::simulated::{CONSTANTS, model, random, rows, staged, white};
+        let (count, deviation) = (1600, 0.1);
+        let mut rows = rows(count, |time| [1.0 + 0.01 * time, 0.01], deviation);
+        let noise = random(100, count);
+        for (row, noise) in noise.iter().enumerate() {
+            if row % 40 < 8 {
+                let more = CONSTANTS[0] * growth * (row as f64 / count as f64 - 0.5);
+                rows.rhs[row] += more * rows.regressors[1].value[row];
+            } else {
+                rows.rhs[row] = deviation * noise;
+                rows.regressors.iter_mut().for_each(|one| one.value[row] = 0.0);
+            }
+        }
+        let variance = deviation * deviation;
+        let problem = model().problem(&rows, &rows.rhs, 0.0, None);
+        let fit = Fit::in_rows(&problem, 160, white(variance), Instructions::Scalar).expect("constants");
+        let noise = TestNoise {
+            expected: white(variance),
+            covariance: &RowCovariance::by_distance(vec![variance]),
+            inflation: 1.0,
+            from: NoiseFrom::Channels,
+            equations: 1,
+        };
+        staged(|stages| test(&problem, &fit, noise, Instructions::Scalar, stages)).remove(0)
+    }
+
+    #[test]
+    fn blocks_that_are_struck_now_and_then_say_whether_a_constant_changes() {
+        assert!(beside_blows(0.0).expect("eight blocks").probability > 1e-3);
+        assert!(beside_blows(0.5).expect("eight blocks").probability < NO_CHANCE);
     }
 
     #[test]

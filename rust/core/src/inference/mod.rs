@@ -2,6 +2,7 @@
 
 pub(crate) mod constancy;
 pub(crate) mod cross_validation;
+pub(crate) mod drive;
 pub(crate) mod explained;
 pub(crate) mod identifiability;
 pub(crate) mod jumps;
