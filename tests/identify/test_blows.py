@@ -45,7 +45,7 @@ def struck(
     return noisy, torque + torque_noise * torque.std() * generator.standard_normal(torque.size), inertia[::FINER]
 
 
-@pytest.mark.parametrize("seed", [2])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_blows_find_what_is_constant(seed: int) -> None:
     angle, torque, _ = struck(seed, lasting=16)
     result = tvident.identify(angle, torque, sample_rate=RATE)
@@ -66,3 +66,16 @@ def test_an_inertia_that_grows_between_blows_is_no_stiffness_that_falls(seed: in
     inside = slice(500, -500)
     assert np.max(np.abs(result.inertia / inertia - 1)[inside]) < 0.01
     assert np.max(np.abs(np.broadcast_to(result.stiffness, angle.shape) / STIFFNESS - 1)[inside]) < 0.01
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_widths_that_differ_by_less_than_a_thousandth_are_trusted_and_errors_hold_it(seed: int) -> None:
+    # With next to no noise the straight lines of the torque are a difference beyond every error.
+    angle, torque, _ = struck(seed, lasting=16, torque_noise=1e-4)
+    result = tvident.identify(angle, torque, sample_rate=RATE)
+    assert not result.record_status & Status.SCALES_DISAGREE
+    assert any("which standard errors hold" in reason for reason in result.reasons)
+    for name, truth in (("inertia", INERTIA), ("damping", DAMPING), ("stiffness", STIFFNESS)):
+        found = result.value(name)
+        assert abs(found.value - truth) < 3 * found.stderr, name
+        assert found.stderr < 0.002 * truth

@@ -15,6 +15,9 @@ from tvident._status import Status
 _NEAR = 3
 """Widths about the one that is used, at least, to say by how much their parameters differ."""
 
+_AGREE = 2.0
+"""Estimates agree that differ by no more than so many standard errors, the smaller of the two."""
+
 _TOLD = 3.0
 """Standard errors by which a number differs from zero, at least, to be told from it."""
 
@@ -36,7 +39,7 @@ def scales_compared(found: _core.Identification, flags: Status) -> list[str]:
     narrowest, widest = scan.plateau
     only = "" if _is_wide(scan) else " alone"
     samples = f"{scan.window_length[narrowest]} to {scan.window_length[widest]} samples"
-    agree = f"estimates are the same from {samples} of the test function{only}"
+    agree = f"estimates are the same from {samples} of the test function{only}{_but_for(scan)}"
     if narrowest == 0 or not scan.moved:
         return [agree]
     return [
@@ -94,6 +97,18 @@ def _by_how_much(found: _core.Identification, names: Sequence[str]) -> str:
         return ""
     narrowest, widest = (scan.window_length[place] for place in (near[0], near[-1]))
     return f" (from {narrowest} to {widest} samples {listed(differences)})"
+
+
+def _but_for(scan: _core.Scan) -> str:
+    """Return by how much widths that agree differ, where that is more than their errors."""
+    if scan.plateau is None:
+        return ""
+    first, last = scan.plateau
+    values, errors = (np.array(of[first : last + 1]) for of in (scan.values, scan.stderr))
+    apart = np.abs(values - values[0])
+    parts = apart / np.abs(values[0])
+    beyond = parts[apart > _AGREE * np.minimum(errors, errors[0])]
+    return f" but for {percent(float(beyond.max()))}, which standard errors hold" if beyond.size else ""
 
 
 def _none_of_stiffness(found: _core.Identification, names: Sequence[str]) -> str:

@@ -24,7 +24,7 @@ pub use merged::found::{FoundElement, MergedFound};
 pub use merged::system::{Element, Entry, Merged, MergedOptions, Multiplied, Trial};
 pub use options::{Method, Options, Repeated, StrongForm, Task, WeakForm, WidthFrom};
 pub use route::identify_all;
-pub use scanned::{FEWEST_WIDTHS, OTHER_CONSTANT, Scan};
+pub use scanned::{Agreement, FEWEST_WIDTHS, OTHER_CONSTANT, Scan};
 pub use strong::constant::{constants_of_rows, rows_of_part};
 pub use strong::parts::{around, parts_of_scatter, scatter_of_windows};
 pub use strong::scan::scan_windows;

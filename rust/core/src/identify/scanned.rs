@@ -1,7 +1,7 @@
 //! What a scan of the test function's width found, and what it says of a result.
 
 use crate::identify::results::Constant;
-use crate::inference::scales::{AGREE, AtScale, LEAST_PLATEAU, Plateau, plateau};
+use crate::inference::scales::{AGREE, ALIKE, AtScale, LEAST_PLATEAU, Plateau, plateau};
 use crate::status::Status;
 
 /// From one half-width to the next.
@@ -21,6 +21,18 @@ pub const OTHER_CONSTANT: f64 = 4.0;
 /// From so many widths on there has to be a plateau.
 const ENOUGH_WIDTHS: usize = 6;
 
+/// How widths of the test function agree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Agreement {
+    /// Within their errors.
+    #[default]
+    WithinErrors,
+    /// But for what matters to nobody, and beyond their errors.
+    Alike,
+    /// The one that is used does not.
+    Contradicted,
+}
+
 /// Estimates by the width of the test function.
 #[derive(Clone, Debug, Default)]
 pub struct Scan {
@@ -34,8 +46,8 @@ pub struct Scan {
     pub corrected: bool,
     /// The widths that agree; `None` where too few could be compared.
     pub plateau: Option<Plateau>,
-    /// Whether the test function that is used contradicts the plateau.
-    pub contradicted: bool,
+    /// How widths agree, and the test function that is used with them.
+    pub agreement: Agreement,
     /// Whether the test function was moved to the plateau.
     pub moved: bool,
 }
@@ -50,7 +62,20 @@ pub(crate) fn wider(half: usize) -> usize {
 impl Scan {
     /// Looks for widths that agree, among enough of them.
     pub(crate) fn find_plateau(&mut self) {
-        self.plateau = plateau(&self.scales).filter(|_| self.scales.len() >= FEWEST_WIDTHS);
+        self.plateau = plateau(&self.scales, 0.0).filter(|_| self.scales.len() >= FEWEST_WIDTHS);
+    }
+
+    /// The part of them that estimates which agree may differ by, beside their errors.
+    fn part(&self) -> f64 {
+        if self.agreement == Agreement::Alike { ALIKE } else { 0.0 }
+    }
+
+    /// Looks for widths that agree but for what matters to nobody.
+    pub(crate) fn find_widths_alike(&mut self) {
+        let found = Self { plateau: plateau(&self.scales, ALIKE), agreement: Agreement::Alike, ..self.clone() };
+        if self.scales.len() >= FEWEST_WIDTHS && found.factor() >= LEAST_PLATEAU {
+            *self = found;
+        }
     }
 
     /// By what factor widths that agree differ.
@@ -62,7 +87,7 @@ impl Scan {
     pub(crate) fn contradicts(&self, other: &Self) -> bool {
         let (true, Some(one)) = (self.factor() >= LEAST_PLATEAU, other.narrowest()) else { return false };
         let same = self.scales.iter().find(|scale| scale.half_width == one.half_width);
-        same.is_some_and(|same| !same.agrees(one, AGREE))
+        same.is_some_and(|same| !same.agrees(one, AGREE, self.part()))
     }
 
     /// The narrowest scale of the plateau.
@@ -108,18 +133,46 @@ impl Scan {
         })
     }
 
-    /// What the scan says of the whole record and of the constants that were found in it.
+    /// What the scan says of the whole record and of the constants that were found in it, where their errors hold what widths that are alike differ by.
     pub(crate) fn status(&self, constants: &[Constant]) -> Status {
-        let other = self.narrowest().is_some_and(|one| constants.iter().any(|found| self.differs(one, found)));
-        let disagree = self.has_no_plateau() || self.contradicted || other;
+        self.status_but_for(constants, ALIKE)
+    }
+
+    /// What it says where the errors of the constants hold a part of them.
+    pub(crate) fn status_but_for(&self, constants: &[Constant], part: f64) -> Status {
+        let is_contradicted = self.agreement == Agreement::Contradicted;
+        let disagree = self.has_no_plateau() || is_contradicted || self.differs(constants, part);
         if disagree { Status::SCALES_DISAGREE } else { Status::GOOD }
     }
 
-    /// Whether a constant is not what the plateau says, by more than chance.
-    fn differs(&self, scale: &AtScale, constant: &Constant) -> bool {
+    /// What the constants, those that change slowly and come first left alone, may be wrong by where other widths find them alike but not within errors:
+    /// the difference from the one of the plateau that differs most. Nothing where they are contradicted.
+    pub(crate) fn apart(&self, constants: &[Constant], slow: usize) -> Option<Vec<f64>> {
+        let is_apart = self.agreement == Agreement::Alike || self.differs(constants, 0.0);
+        let plateau = self.plateau.filter(|_| is_apart && self.status(constants) == Status::GOOD)?;
+        let from = |scale: &AtScale| -> Vec<f64> {
+            let place = |one: &Constant| self.unknowns.iter().position(|&unknown| unknown == one.unknown);
+            let off = |one: &Constant| place(one).map_or(0.0, |place| scale.values[place] - one.value);
+            constants.iter().map(off).collect()
+        };
+        let beyond = |off: &Vec<f64>| -> f64 {
+            off.iter().zip(constants).map(|(off, one)| (off / one.error).powi(2)).filter(|one| one.is_finite()).sum()
+        };
+        let differences = self.scales[plateau.first..=plateau.last].iter().map(from);
+        let most = differences.max_by(|one, other| beyond(one).total_cmp(&beyond(other)))?;
+        Some(std::iter::repeat_n(0.0, slow).chain(most).collect())
+    }
+
+    /// Whether a constant is not what the plateau says, by more than chance and a part of it.
+    fn differs(&self, constants: &[Constant], part: f64) -> bool {
+        self.narrowest().is_some_and(|one| constants.iter().any(|found| self.differs_at(one, found, part)))
+    }
+
+    fn differs_at(&self, scale: &AtScale, constant: &Constant, part: f64) -> bool {
         let Some(place) = self.unknowns.iter().position(|&one| one == constant.unknown) else { return false };
         let error = scale.errors[place].hypot(constant.error);
-        (scale.values[place] - constant.value).abs() > OTHER_CONSTANT * error
+        let most = (OTHER_CONSTANT * error).max(part * constant.value.abs());
+        (scale.values[place] - constant.value).abs() > most
     }
 
     pub(crate) fn nearest(&self, half_width: usize) -> Option<(usize, &AtScale)> {
@@ -171,14 +224,31 @@ impl Scans {
         self.best.widest().is_some_and(|widest| one.half_width > widest)
     }
 
+    /// The best scan where a half-width is used, with what it says of that.
+    pub(crate) fn with(&self, half_width: usize) -> Scan {
+        let agreement = if self.differ(half_width, ALIKE) {
+            Agreement::Contradicted
+        } else if self.contradict(half_width) {
+            Agreement::Alike
+        } else {
+            self.best.agreement
+        };
+        Scan { agreement, ..self.best.clone() }
+    }
+
     /// Whether a half-width, corrected for noise, contradicts the plateau.
     pub(crate) fn contradict(&self, half_width: usize) -> bool {
+        self.differ(half_width, 0.0)
+    }
+
+    /// The same by more than a part of what it finds.
+    fn differ(&self, half_width: usize, part: f64) -> bool {
         let (Some(accepted), Some((place, chosen))) = (self.best.narrowest(), self.corrected.nearest(half_width))
         else {
             return false;
         };
         let on_its_own = self.corrected.accepted_plateau().is_some_and(|own| own.holds(place));
-        !on_its_own && !accepted.agrees(chosen, CONTRADICTS)
+        !on_its_own && !accepted.agrees(chosen, CONTRADICTS, part)
     }
 }
 
@@ -249,5 +319,27 @@ mod tests {
         // Too few widths are no plateau.
         assert!(!scan(1.0, 0.01, 2).contradicts(&scan(0.95, 0.01, 6)));
         assert!(!shorter.contradicts(&scan(0.95, 0.01, 2)));
+    }
+
+    #[test]
+    fn widths_that_differ_by_next_to_nothing_are_no_contradiction_and_errors_hold_it() {
+        let mut scan = scan(1.0, 1e-6, 8);
+        for (place, scale) in scan.scales.iter_mut().enumerate() {
+            scale.values[0] += 1e-4 * place as f64;
+        }
+        scan.unknowns = vec![0];
+        scan.find_plateau();
+        assert!(scan.has_no_plateau());
+        scan.find_widths_alike();
+        assert_eq!((scan.agreement, scan.has_no_plateau()), (Agreement::Alike, false));
+        let constant = |value: f64| [Constant { unknown: 0, value, error: 1e-6, test: None }];
+        assert_eq!(scan.status(&constant(1.0005)), Status::GOOD);
+        assert_eq!(scan.status_but_for(&constant(1.0005), 0.0), Status::SCALES_DISAGREE);
+        assert_eq!(scan.status(&constant(1.002)), Status::SCALES_DISAGREE);
+        // Another that changes slowly comes first.
+        let apart = scan.apart(&constant(1.0001), 1).expect("widths that are alike");
+        assert_eq!(apart[0], 0.0);
+        assert!((apart[1] - 6e-4).abs() < 1e-12, "{apart:?}");
+        assert_eq!(scan.apart(&constant(1.002), 1), None);
     }
 }

@@ -107,10 +107,19 @@ impl Widths {
         found
     }
 
-    /// The longest plateau, and the longest of those with the correction for noise. Where plateaus are equally long, the one with the
-    /// correction stands.
+    /// The longest plateau, and the longest of those with the correction for noise; where there is none, of widths that are alike.
     pub(crate) fn plateaus(mut self) -> Scans {
         self.scans.iter_mut().flatten().for_each(Scan::find_plateau);
+        let found = self.longest_plateaus();
+        if !found.best.has_no_plateau() {
+            return found;
+        }
+        self.scans.iter_mut().flatten().for_each(Scan::find_widths_alike);
+        self.longest_plateaus()
+    }
+
+    /// Where plateaus are equally long, the one with the correction for noise stands.
+    fn longest_plateaus(&self) -> Scans {
         let is_noisy = self.noises[0] > 0.0;
         let (mut best, mut corrected): (Option<Scan>, Option<Scan>) = (None, None);
         for scan in (0..self.noises.len()).flat_map(|noise| self.unbiased(noise)) {

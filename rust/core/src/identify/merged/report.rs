@@ -93,7 +93,7 @@ impl MergedSession<'_, '_, '_> {
             found.record_status |= if holds { flag } else { Status::GOOD };
         }
         found.scan = std::mem::take(&mut self.scan);
-        found.record_status |= found.scan.status(&found.constants_found());
+        found.record_status |= found.scan.status_but_for(&found.constants_found(), 0.0);
         let SuspectedChannels { each, beside } = self.suspected_channels(fitted, &noise, &correlated)?;
         let SuspectedTerms { each: terms, beside: beside_terms } = self.suspected_terms(fitted, &noise, &correlated)?;
         let is_other = |beside: Fit| self.are_others(fitted, &beside, &errors, &covariance);

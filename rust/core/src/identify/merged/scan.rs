@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::identify::kinds::Kind;
 use crate::identify::merged::session::MergedSession;
 use crate::identify::merged::system::Multiplied;
-use crate::identify::scanned::{BLOCKS, Scan, Scans, wider};
+use crate::identify::scanned::{Agreement, BLOCKS, Scan, Scans, wider};
 use crate::inference::scales::AtScale;
 use crate::regression::block_fit::{BlockFit, fit_in_blocks};
 use crate::regression::model::Model;
@@ -45,7 +45,9 @@ impl MergedSession<'_, '_, '_> {
         self.pilot()?;
         self.scan = scans.best.clone();
         self.scan.moved = suggested.is_some_and(|one| one.half_width() != half);
-        self.scan.contradicted = scans.contradict(half);
+        if scans.contradict(half) {
+            self.scan.agreement = Agreement::Contradicted;
+        }
         Ok(())
     }
 

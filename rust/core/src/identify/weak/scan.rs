@@ -57,8 +57,8 @@ impl Session<'_, '_, '_> {
             chosen = self.without_shortest_windows(chosen, model, last)?;
         }
         let used = chosen.weak.function.half_width();
+        self.scan = scans.with(used);
         self.scan.moved = used != before || self.options.width_from == Some(WidthFrom::Plateau);
-        self.scan.contradicted = scans.contradict(used);
         Ok(chosen)
     }
 

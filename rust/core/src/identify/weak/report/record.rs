@@ -60,8 +60,7 @@ impl Session<'_, '_, '_> {
         let mut changes: Vec<&[f64]> = left.iter().map(|left| left.changes.as_slice()).collect();
         found.covariance = with_changes(covariance, &changes);
 
-        let slow = decided.slow.len();
-        let count = ordered.constant.len();
+        let (slow, count) = (decided.slow.len(), ordered.constant.len());
         let mut values = vec![0.0; slow];
         values.extend(&fit.pooled.values);
         found.constants = constants(decided, &values, &found.covariance);
@@ -72,15 +71,17 @@ impl Session<'_, '_, '_> {
             return Ok((self.undetermined(nothing, decided)?, None));
         }
         let suspected = self.suspects(&weak, decided, fit, Arc::clone(&correlated), &errors)?;
+        let widths = told.unwrap_or(&self.scan);
+        let apart = widths.apart(&found.constants, slow);
         // Where widths of the test function contradict the constants, these errors would only hide it.
-        if told.unwrap_or(&self.scan).status(&found.constants) == Status::GOOD {
-            changes.extend(suspected.changes.iter().map(Vec::as_slice));
+        if widths.status(&found.constants) == Status::GOOD {
+            changes.extend(suspected.changes.iter().chain(&apart).map(Vec::as_slice));
             found.covariance = with_changes(found.covariance, &changes[left.iter().len()..]);
             found.constants = constants(decided, &values, &found.covariance);
         }
         found.constant_pairs = pairs_of(&ordered.constant, slow, &found.covariance);
-        let (weakest, noise) = (&found.weakest, self.noise[0]);
-        found.mostly_noise = is_mostly_noise(&problem, rows, &ordered, all, weakest, noise, &mut self.stages)?;
+        found.mostly_noise =
+            is_mostly_noise(&problem, rows, &ordered, all, &found.weakest, self.noise[0], &mut self.stages)?;
         let mut tracks = self.tracks(&problem, &weak, decided, (fit, all), &values, errors.expected)?;
         let variances: Vec<f64> = (slow..count).map(|place| found.covariance[place * (count + 1)]).collect();
         let outside = self.outside_mask(
