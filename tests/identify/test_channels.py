@@ -84,6 +84,19 @@ def test_a_velocity_without_an_angle_tells_the_same() -> None:
     assert np.sqrt(np.mean(np.square(biases))) < 2
 
 
+def test_an_accelerometer_in_g_and_a_speed_in_turns_a_minute() -> None:
+    record = Record(17032, angle=0.01)
+    plain = record.identify(None, acceleration=record.acceleration(0.01), torque_unit="N")
+    record = Record(17032, angle=0.01)
+    found = record.identify(
+        None, acceleration=tvident.Channel(record.acceleration(0.01) / 9.80665, "g"), torque_unit="N"
+    )
+    assert found.constants["inertia"][0] == pytest.approx(plain.constants["inertia"][0], rel=1e-9)
+    speed = tvident.Channel(record.velocity(0.01) * 30 / np.pi, "1/min")
+    turned = record.identify(None, velocity=speed).constants["inertia"]
+    assert abs(turned[0] - record.truth["inertia"]) < 4 * turned[1]
+
+
 def test_a_motor_without_a_spring_needs_no_angle() -> None:
     rng = np.random.default_rng(0)
     t = np.arange(5000) / RATE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 from typing import Any
 
@@ -10,7 +11,7 @@ import pint
 import pytest
 
 from tvident import Channel
-from tvident._units import LINEAR, ROTARY, factor_to, is_unit, named_unit, unit_of
+from tvident._units import LINEAR, ROTARY, factor_of_derivative, factor_to, is_unit, named_unit, unit_of
 from tvident._units.symbols import SYMBOLS
 
 PINT: Any = pint.application_registry
@@ -208,6 +209,42 @@ def test_what_cannot_be_converted_is_refused_with_the_cure() -> None:
     ):
         with pytest.raises(ValueError, match=f"{quantity}_unit='{system.units[quantity]}' if the numbers are in"):
             factor_to(system, quantity, unit, name="the channel")
+
+
+@pytest.mark.parametrize("text", ["Grad", "grad", "[Grad]", "GRAD"])
+def test_a_degree_in_german_is_asked_for(text: str) -> None:
+    """The cure was angle_unit='rad', which nobody means who writes Grad."""
+    with pytest.raises(ValueError, match="angle_unit='deg' or angle_unit='gon'"):
+        factor_to(ROTARY, "angle", text, name="the angle")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        *((text, math.pi / 30) for text in ("rpm", "1/min", "min-1", "min⁻¹", "U/min", "Umdr./min", "r/min", "tr/min")),
+        *((text, math.tau) for text in ("rev/s", "rps", "U/s")),
+        *((text, math.pi / 180) for text in ("deg/s", "°/s", "dps")),
+        ("rad/s", 1),
+    ],
+)
+def test_speeds_of_turning(text: str, expected: float) -> None:
+    """1/min was taken for radians per minute: 6.28 times too small, without a word."""
+    assert factor_of_derivative(ROTARY, "velocity", text) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(("name", "text"), [("velocity", "1/s"), ("velocity", "Hz"), ("acceleration", "1/s^2")])
+def test_what_may_count_turns_or_radians_is_refused(name: str, text: str) -> None:
+    with pytest.raises(ValueError, match="whether radians or turns are counted"):
+        factor_of_derivative(ROTARY, name, text)
+
+
+def test_an_accelerometer_measures_in_g() -> None:
+    for text, expected in (("g", 9.80665), ("[g]", 9.80665), ("mg", 9.80665e-3), ("mm/s^2", 1e-3)):
+        assert factor_of_derivative(LINEAR, "acceleration", text) == pytest.approx(expected, rel=1e-12)
+    with pytest.raises(ValueError, match=r"divide it in m/s\^2 by its radius in m"):
+        factor_of_derivative(ROTARY, "acceleration", "g")
+    with pytest.raises(ValueError, match="converted to m/s; got 'g'"):
+        factor_of_derivative(LINEAR, "velocity", "g")
 
 
 def test_slices_keep_their_unit_and_what_is_computed_has_none() -> None:

@@ -25,7 +25,7 @@ from tvident._identify.signals import Signals, channels_of_motion, even_times, i
 from tvident._identify.task import Task
 from tvident._identify.together import sampled
 from tvident._identify.weighted import Weights, usable_channels, weights_of
-from tvident._units import ROTARY, Axis, axis_of, factor_between, scaled, unit_said
+from tvident._units import ROTARY, Axis, axis_of, factor_between, factor_of_derivative, scaled, unit_said
 
 
 # One step after the other, each with what all before it found.
@@ -199,8 +199,7 @@ def _factor_of(name: str, values: Any, axis: Axis) -> float:
     if name == "angle":
         return axis.angle
     said = unit_said(values)
-    per_second = {"velocity": "/s", "acceleration": "/s^2"}[name]
-    return factor_between(said, axis.system.units["angle"] + per_second, name=f"the {name}") if said else 1.0
+    return factor_of_derivative(axis.system, name, said) if said else 1.0
 
 
 def _in_units_of_results(name: str, value: float | None, factor: float) -> float | None:

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 
-from tvident._units.symbols import ALONE_IN_CAPITALS, IN_CAPITALS, LONGEST, NONE, SYMBOLS, Dimension
+from tvident._units.symbols import ALONE_IN_CAPITALS, IN_CAPITALS, LONGEST, NONE, ROTATIONS, SYMBOLS, Dimension
 
 _LONGEST_TEXT = 60
 
@@ -50,6 +50,9 @@ def unit_of(text: str) -> Unit | None:
     plain = plain.removesuffix(".")
     if "grad" in plain.lower():
         return None  # degrees in German, gon in French, and no gram
+    speed = ROTATIONS.get(plain.lower().replace(".", ""))
+    if speed is not None:
+        return Unit(*speed)
     exact = _product(plain)
     return _product(_in_usual_letters(plain)) if exact is None else exact
 

@@ -22,6 +22,11 @@ _RADIAN = 3
 _WEIGHT_ON_AN_ARM = (1, 1, *NONE[2:])
 """kg cm, in-lb: what a mass weighs, on an arm."""
 
+_IN_GRAVITY = dict.fromkeys(("g", "G", "gn", "g_n"), GRAVITY) | {"mg": 1e-3 * GRAVITY}
+"""What accelerometers measure in, which is a mass elsewhere."""
+
+_PER_SECOND, _PER_SECOND_SQUARED, _PER_MINUTE = (0, 0, -1, *NONE[3:]), (0, 0, -2, *NONE[3:]), 1 / 60
+
 
 @dataclass(frozen=True)
 class System:
@@ -106,6 +111,11 @@ def factor_to(system: System, quantity: str, text: str | None, *, name: str) -> 
     wanted = system.units[quantity]
     unit = unit_of(text)
     cure = f"write one of {_EXAMPLES[wanted]}, or give {quantity}_unit='{wanted}' if the numbers are in {wanted}"
+    if unit is None and quantity == "angle" and text.strip("[](){}<> .").lower() == "grad":
+        raise UnitError(
+            f"the unit of {name} must mean one thing; got {text!r}, a degree in German and the 400th part of a turn elsewhere; give "
+            "angle_unit='deg' or angle_unit='gon'"
+        )
     if unit is None:
         raise UnitError(f"the unit of {name} must be one that is known; got {text!r}; {cure}")
     factor = _in(unit, system.dimensions[quantity])
@@ -123,6 +133,43 @@ def _in(unit: Unit, dimension: Dimension) -> float:
     if dimension == _TORQUE and unit.dimension == _WEIGHT_ON_AN_ARM:
         return unit.factor * GRAVITY
     return math.nan
+
+
+def factor_of_derivative(system: System, name: str, text: str) -> float:
+    """Return what a recorded velocity or acceleration is multiplied by to be in the unit of a system.
+
+    Parameters
+    ----------
+    system : System
+        Of the axis.
+    name : {"velocity", "acceleration"}
+        What the channel holds.
+    text : str
+        Its unit. An acceleration along a line may be in g; 1/min is rpm, and what is counted in a second may be turns or radians.
+
+    Raises
+    ------
+    UnitError
+        If the unit is unknown, of another quantity, or may mean two.
+    """
+    wanted = system.units["angle"] + {"velocity": "/s", "acceleration": "/s^2"}[name]
+    bare = text.strip().strip("[](){}<>").strip()
+    if name == "acceleration" and bare in _IN_GRAVITY:
+        if system is LINEAR:
+            return _IN_GRAVITY[bare]
+        raise UnitError(
+            f"the acceleration of an axis that turns must be in a unit that can be converted to {wanted}; got {text!r}, that of an "
+            f"acceleration along a line; divide it in m/s^2 by its radius in m, or say that the axis slides: torque_unit='N'"
+        )
+    unit = unit_of(text)
+    if unit is not None and system is ROTARY and unit.dimension in {_PER_SECOND, _PER_SECOND_SQUARED}:
+        if unit.dimension == _PER_SECOND and math.isclose(unit.factor, _PER_MINUTE):
+            return math.tau * unit.factor
+        raise UnitError(
+            f"the {name} must say whether radians or turns are counted; got {text!r}; write {wanted}, rpm or rev/s, or pass plain "
+            f"numbers in {wanted}"
+        )
+    return factor_between(text, wanted, name=f"the {name}")
 
 
 def factor_between(text: str, wanted: str, *, name: str) -> float:

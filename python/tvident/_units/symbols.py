@@ -113,4 +113,13 @@ ALONE_IN_CAPITALS = {word: word for word in _SAME_IN_CAPITALS} | {"nm": "Nm", "n
 
 IN_CAPITALS = ALONE_IN_CAPITALS | {word: word for word in ("s", "m", "cm", "lb", "oz", "in", "kg")} | {"n": "N"}
 
+_RPM, _TURNS, _DEGREES = ((factor, (0, 0, -1, 1, *NONE[4:])) for factor in (math.pi / 30, math.tau, math.pi / 180))
+
+ROTATIONS: dict[str, tuple[float, Dimension]] = {
+    **dict.fromkeys(("u/min", "umdr/min", "r/min", "tr/min"), _RPM),
+    **dict.fromkeys(("rps", "r/s", "u/s", "tr/s"), _TURNS),
+    "dps": _DEGREES,
+}
+"""Speeds of turning in letters that mean nothing elsewhere, in small letters and without points."""
+
 LONGEST = max(map(len, SYMBOLS))
