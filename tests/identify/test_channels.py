@@ -84,6 +84,18 @@ def test_a_velocity_without_an_angle_tells_the_same() -> None:
     assert np.sqrt(np.mean(np.square(biases))) < 2
 
 
+@pytest.mark.parametrize(("name", "unit"), [("velocity", "rad/s"), ("acceleration", "rad/s^2")])
+def test_noise_is_that_of_the_channel_that_was_recorded(name: str, unit: str) -> None:
+    """It was said to be the angle's, in rad."""
+    record = Record(17031, angle=0.01)
+    given = record.velocity(0.01) if name == "velocity" else record.acceleration(0.01)
+    reason = record.identify(None, **{name: given}).reasons[0]
+    assert f" {unit} in the {name}, " in reason
+    linear = record.identify(None, **{name: given}, torque_unit="N").reasons[0]
+    assert f" {unit.replace('rad', 'm')} in the {name}, " in linear
+    assert " rad in the angle, " in record.identify(record.angle, velocity=record.velocity(0.01)).reasons[0]
+
+
 def test_an_accelerometer_in_g_and_a_speed_in_turns_a_minute() -> None:
     record = Record(17032, angle=0.01)
     plain = record.identify(None, acceleration=record.acceleration(0.01), torque_unit="N")

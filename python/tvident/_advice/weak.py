@@ -70,6 +70,8 @@ class Explained:
         That the gain of a channel seems to change, in words.
     units : mapping of str to str, optional
         Of parameters and terms.
+    source : {"angle", "velocity", "acceleration"}
+        The channel of the motion whose noise is known.
     """
 
     found: _core.Identification
@@ -82,6 +84,7 @@ class Explained:
     lag: float = 0.0
     gains: Sequence[str] = ()
     units: Mapping[str, str] = field(default_factory=lambda: UNITS)
+    source: str = "angle"
 
     def words(self) -> Words:
         """Return what there is to say."""
@@ -152,9 +155,8 @@ class Explained:
         noise = self.found.noise
         angle, torque = (np.nan, np.nan) if noise is None else np.sqrt((noise.angle, noise.torque))
         of_angle, of_torque = ("rad", "N m") if self.units["stiffness"] == UNITS["stiffness"] else ("m", "N")
-        return (
-            f"noise, assumed to be white: {angle:.2g} {of_angle} in the angle, {torque:.2g} {of_torque} in the torque"
-        )
+        of_angle += {"angle": "", "velocity": "/s", "acceleration": "/s^2"}[self.source]
+        return f"noise, assumed to be white: {angle:.2g} {of_angle} in the {self.source}, {torque:.2g} {of_torque} in the torque"
 
     def _unexplained(self) -> str:
         return (

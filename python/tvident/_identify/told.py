@@ -172,7 +172,19 @@ class Told:
             coherences = _core.noise_coherence(data.angles, data.torques, variances, self._inertias(), lags)
         chosen = [name for name in settings["chosen"] if not self.request.is_kept(name)]
         return [
-            Explained(one, names, chosen, tested, data.period, data.step, coherence, late, gains, data.units).words()
+            Explained(
+                one,
+                names,
+                chosen,
+                tested,
+                data.period,
+                data.step,
+                coherence,
+                late,
+                gains,
+                data.units,
+                data.motion.names[0],
+            ).words()
             for one, coherence, late, gains in zip(self.found, coherences, lags, self._of_gains, strict=True)
         ]
 
