@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import tvident
 from tvident import recordings
 
 NAN = float("nan")
@@ -232,3 +233,55 @@ def test_thousands_of_cells_of_which_no_two_lines_have_as_many_are_refused_soon(
     started = time.process_time()
     assert "every line must have 7000 cells; line 2 has 7037" in refusal(tmp_path, content)
     assert time.process_time() - started < 2.0  # 8 s where every line was looked at from all lines above
+
+
+@pytest.mark.parametrize("count", [300, 60_000])
+@pytest.mark.parametrize(
+    ("cut", "why"),
+    [
+        (0, None),
+        (1, "fewer digits in its last cell"),
+        (6, "fewer digits in its last cell"),
+        (8, "nothing in its last cell"),
+        (9, "2 of 3 cells"),
+        (18, "1 of 3 cells"),
+    ],
+)
+def test_a_last_line_within_which_writing_stopped_is_not_read(
+    tmp_path: Path, cut: int, why: str | None, count: int
+) -> None:
+    """A number that was cut was another one, without a word."""
+    drawn = np.random.default_rng(17040).uniform(0, 9.9, (count, 2))
+    text = "t,a,b\n" + "\n".join(f"{i / 1000:.3f},{a:.6f},{b:.6f}" for i, (a, b) in enumerate(drawn))
+    path = tmp_path / "x.csv"
+    path.write_text(text[: len(text) - cut])
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        found = recordings.read(path)
+    assert len(found["t"]) == count - (why is not None)
+    words = [str(one.message) for one in said]
+    if why is None:
+        assert not words
+    else:
+        assert len(words) == 1
+        assert f"line {count + 1} has no end and {why}" in words[0]
+
+
+def test_a_last_line_that_was_cut_is_not_read_piece_by_piece(tmp_path: Path) -> None:
+    rig = tvident.simulate_torsional_rig(duration=2.0, seed=17040)
+    rows = [f"{angle:.9f};{torque:.6f}" for angle, torque in zip(rig.angle, rig.torque, strict=True)]
+    (tmp_path / "x.csv").write_text("a;b\n" + "\n".join(rows)[:-3])
+    with pytest.warns(recordings.FileWarning, match="may have been cut there"):
+        tvident.identify_file(
+            tmp_path / "x.csv", tmp_path / "found.npy", angle="a", torque="b", sample_rate=1000, method="paper"
+        )
+    assert np.load(tmp_path / "found.npy").size == rig.angle.size - 1
+
+
+def test_a_last_line_without_an_end_may_be_whole(tmp_path: Path) -> None:
+    drawn = np.random.default_rng(17041)
+    for write in ("%.4f", "%g", "%r", "%.3e", "%d"):
+        for _ in range(20):
+            rows = drawn.normal(0, 50, (400, 2)).tolist()
+            (tmp_path / "x.csv").write_text("\n".join(f"{write % a},{write % b}" for a, b in rows))
+            assert len(recordings.read(tmp_path / "x.csv")["0"]) == 400

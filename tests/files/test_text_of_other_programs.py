@@ -47,6 +47,37 @@ def test_utf_16_is_known_without_a_mark(tmp_path: Path, encoding: str, names: st
         recordings.read(tmp_path / "x.csv")
 
 
+def test_numbers_that_fill_their_columns_are_asked_for_a_blank(tmp_path: Path) -> None:
+    """A first row of them was left out as one that holds no names, a last one as words."""
+    rows = [" 1.0D+00-2.0D+00", " 1.0D+00 2.0D+00", " 1.5D+00 3.0D+00"]
+    for place, cure in (
+        (0, "write a blank before every sign"),
+        (1, "every line must have 2 cells"),
+        (2, "every line must"),
+    ):
+        lines = rows[1:]
+        lines.insert(place, rows[0])
+        with pytest.raises(recordings.FileError, match=cure):
+            read(tmp_path, "\n".join(lines) + "\n")
+
+
+def test_a_comment_may_be_about_values_that_are_missing(tmp_path: Path) -> None:
+    """It was refused as a row in which words stand."""
+    found = read(tmp_path, "#NV, not available\nt,x\n1,2\n#NV, a sensor fell off\n#NV,#NV\n3,4\n")
+    np.testing.assert_equal(found, {"t": [1, np.nan, 3], "x": [2, np.nan, 4]})
+    with pytest.warns(recordings.FileWarning, match="'state': not read"):
+        assert len(read(tmp_path, "t,x,state\n1,2,a\n2,3,b\n#NV,#NV,b\n3,4,c\n")["t"]) == 4
+
+
+def test_a_file_that_was_appended_to_says_so(tmp_path: Path) -> None:
+    """The cure was to write numbers without separators of thousands."""
+    block = "t;x\ns;Grad\n0,5;1,5\n0,6;1,7\n"
+    with pytest.raises(
+        recordings.FileError, match="line 6 repeats what stands above the numbers, 't;x', and numbers go on in line 8"
+    ):
+        read(tmp_path, block + "\n" + block)
+
+
 def test_fortran_writes_d_before_exponents(tmp_path: Path) -> None:
     assert read(tmp_path, " 1.0D+03  2.5d-01\n 3.0D+00  -.5D-002\n") == {"0": [1000, 3], "1": [0.25, -0.005]}
     assert read(tmp_path, "a,b\n0.1D+01,1.5\n0.2D+01,2.5\n,1E3\n")["a"][:2] == [1, 2]

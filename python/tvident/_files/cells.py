@@ -16,6 +16,9 @@ _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _FORTRAN = re.compile(r"([+-]?(?:\d+\.\d*|\.\d+))[dD]([+-]?\d{1,3})", re.ASCII)
 """Double precision as Fortran writes it."""
 
+_JOINED = re.compile(r"[-+]?\d*\.\d*(?:[eEdD][-+]?\d+)?(?:[-+]\d*\.\d*(?:[eEdD][-+]?\d+)?)+", re.ASCII)
+"""Numbers that fill their columns, as Fortran writes them."""
+
 _COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
 _GROUPS = re.compile(
     r"[+-]?[1-9]\d{0,2}(?:(?P<blank>[ '\u2019\u00a0\u2009\u202f])\d{3}(?:(?P=blank)\d{3})*(?P<behind>[.,]\d*)?"
@@ -40,6 +43,7 @@ _NOT_AVAILABLE = re.compile("#(?:n/[ad]|nv)", re.IGNORECASE)
 """What a sheet writes on purpose, for a value that is missing."""
 
 _NOT_A_COMMENT = re.compile(rf"{_ERROR}|#(?:qnan|snan|ind|inf)\b", re.IGNORECASE | re.MULTILINE)
+_BETWEEN_CELLS = re.compile(r"[,;\t|]")
 _IN_QUOTES = re.compile(r'"[^"]*"|[^\s"]+')
 
 
@@ -70,6 +74,16 @@ def without_comment(line: str) -> str:
 def is_comment(line: str) -> bool:
     """Return whether a line is nothing but a comment."""
     return line.lstrip().startswith("#") and not without_comment(line).strip()
+
+
+def is_remark(line: str) -> bool:
+    """Return whether a line begins as an error of a spreadsheet does, and goes on with words and no number: a comment about it."""
+    if not line.lstrip().startswith("#"):
+        return False
+    cells = [cell.strip() for cell in _BETWEEN_CELLS.split(line)]
+    return any(number(cell, comma=True) is None for cell in cells) and not any(
+        is_present(cell, comma=True) for cell in cells
+    )
 
 
 def hides_numbers(text: str) -> bool:
@@ -145,6 +159,11 @@ def decimal_sign(cell: str) -> str | None:
     if groups["blank"]:
         return None
     return "." if "," in cell else ","
+
+
+def are_joined(cell: str) -> bool:
+    """Return whether nothing but the sign of the second stands between two numbers."""
+    return _JOINED.fullmatch(cell) is not None
 
 
 def is_present(cell: str, *, comma: bool) -> bool:

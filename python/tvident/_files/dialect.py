@@ -49,6 +49,8 @@ class Dialect:
     """Of the columns."""
     times: dict[int, list[str]]
     """First cells of the columns that hold times."""
+    above: frozenset[str] = frozenset()
+    """Lines above the numbers that say something."""
     decimal: str | None = None
     """The decimal sign, where it is known."""
 
@@ -88,7 +90,8 @@ def dialect_of(lines: Sequence[str], say: Say) -> Dialect | None:
     is_named, names = names is not None, names or [str(index) for index in range(len(start.cells))]
     kinds = tuple(_kind([row[column] for row in rows]) for column in range(len(names)))
     times = {column: [row[column] for row in rows] for column, kind in enumerate(kinds) if kind == "time"}
-    return Dialect(start.separator, start.first, names, len(start.cells), is_named, kinds, times)
+    said = frozenset(lines[line.place - 1].strip() for line in above if line.says_something)
+    return Dialect(start.separator, start.first, names, len(start.cells), is_named, kinds, times, said)
 
 
 def mixed_line(lines: Sequence[str]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from tvident._files.cells import Separator, is_present, number, split, without_comment
+from tvident._files.cells import Separator, are_joined, is_present, is_remark, number, split, without_comment
 from tvident._files.channels import FileError, Say
 from tvident._files.names import listed, printable
 from tvident._units import is_unit, named_unit, with_unit
@@ -56,7 +56,8 @@ class Line:
         whole = split(text, separator)
         mark = None if bool(whole) and whole[0] == "%" and _are_units(whole) else _MARK.match(text)
         bare = text if mark is None else text[mark.end() :]
-        self.says_something = any(one.isalnum() for one in bare) and not _HINT.fullmatch(bare.strip())
+        is_hint = _HINT.fullmatch(bare.strip()) is not None or (not self.is_comment and is_remark(text))
+        self.says_something = any(one.isalnum() for one in bare) and not is_hint
         self.cells = split(bare, separator)
         self._text = bare.strip() if separator is None else ""
         self.width = len(self.cells)
@@ -212,6 +213,12 @@ class Names:
     def _check_no_numbers(self, nearest: Line) -> None:
         """Refuse a line that is no names: too few numbers, or too few names where a comma may be what makes numbers more."""
         words, comma = len(nearest.cells), self.separator != ","
+        joined = next((cell for cell in nearest.cells if are_joined(cell)), None)
+        if joined is not None:
+            raise FileError(
+                f"something must stand between two numbers; line {nearest.place} has '{printable(joined, 40)}'; write a blank before "
+                "every sign"
+            )
         if all(number(cell, comma=comma) is not None for cell in nearest.cells):
             raise FileError(
                 f"every line must have {self.most} cells; line {nearest.place} has {words}; repair it, or begin it with #"

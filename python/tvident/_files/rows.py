@@ -12,16 +12,19 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._files.cells import (
+    are_joined,
     decimal_sign,
     fortran_as_usual,
     hides_numbers,
     is_error,
     is_present,
+    is_remark,
     number,
     split,
     without_comment,
 )
 from tvident._files.channels import FileError, Say
+from tvident._files.cut import what_lacks
 from tvident._files.dialect import Dialect
 from tvident._files.headers import CURE, not_a_number
 from tvident._files.names import printable
@@ -49,6 +52,10 @@ _STATISTICS = re.compile(
 _TIMES = re.compile(r"\d+[-./:]\d+[-./:][\d.,:]+")
 
 _BLANK_LINE = re.compile(r"(^|\n)[ \t]*\n")
+
+
+_JUST_BEFORE = 1 << 16
+"""Characters of the lines that a last one without an end is compared with."""
 
 
 class OtherDecimalSignError(Exception):
@@ -84,6 +91,10 @@ class Rows:
         self._error: tuple[int, int, str] | None = None
         """Line, column and cell of the first error of a spreadsheet, of so many."""
         self._error_count = 0
+        self._before = ""
+        """The end of the last piece."""
+        self._cut = ""
+        """Why the last line is not read, which has no end."""
         self.hollow = 0
         """Rows at the end that hold separators alone."""
         self.times = {column: TimeColumn(cells) for column, cells in dialect.times.items()}
@@ -94,6 +105,7 @@ class Rows:
     def read(self, text: str) -> Numbers:
         """Return the rows of some whole lines."""
         check_text(text, self._line)
+        text = self._without_cut_line(text)
         # Numbers below words are an error, and so are empty lines in a single column: line by line both are found.
         unusual = self._words is not None or hides_numbers(text)
         unusual |= self._width == 1 and (self._blank > 0 or _BLANK_LINE.search(text) is not None)
@@ -104,6 +116,23 @@ class Rows:
         self._count_hollow(text, found.shape[0])
         self._line += lines
         return found
+
+    def _without_cut_line(self, text: str) -> str:
+        """Return a piece without a last line that has no end and lacks cells or digits: writing stopped within it."""
+        whole, end, last = text.rpartition("\n")
+        above, self._before = self._before + whole[-_JUST_BEFORE:], text[-_JUST_BEFORE:]
+        cells = split(last, self._dialect.separator)
+        if not last.strip() or self._words is not None or "#" in last or self._is_end(cells):
+            return text
+        rows = [split(line, self._dialect.separator) for line in above.split("\n")[1:]]
+        lacks = what_lacks(
+            cells, [row for row in rows if len(row) == self._width], is_time=self._width - 1 in self.times
+        )
+        if not lacks or self._width - 1 in self._remarks:
+            return text
+        place = self._line + text.count("\n") + 1
+        self._cut = f"line {place} has no end and {lacks}: not read, since the file may have been cut there"
+        return whole + end
 
     def _count_hollow(self, text: str, rows: int) -> None:
         """Count the rows at the end so far that hold separators alone: a sheet may write many below its last number."""
@@ -144,6 +173,8 @@ class Rows:
             self._say(
                 f"{count} of a spreadsheet, read as missing: '{printable(cell, 40)}' in line {place}, column '{name}'"
             )
+        if self._cut:
+            self._say(self._cut)
         if self.hollow:
             self._say(f"the last {'row holds' if self.hollow == 1 else f'{self.hollow} rows hold'} nothing: not read")
         if self._words is not None:
@@ -216,7 +247,7 @@ class Rows:
         rows = []
         for place, whole in enumerate(lines, self._line + 1):
             line = without_comment(whole)
-            if not line.strip():
+            if not line.strip() or (self._dialect.is_plain and is_remark(line)):
                 if self._width == 1 and place < self._line + len(lines) and not whole.lstrip().startswith("#"):
                     self._blank = place
                 continue
@@ -270,7 +301,8 @@ class Rows:
 
     def _is_end(self, cells: list[str]) -> bool:
         """Return whether a line may stand below the numbers: words first, and not a row in which one number is wrong."""
-        if not cells or number(cells[0], comma=True) is not None or instant(cells[0]) is not None:
+        first = cells[0] if cells else ""
+        if not cells or number(first, comma=True) is not None or instant(first) is not None or are_joined(first):
             return False
         if _STATISTICS.fullmatch(cells[0]):
             return True
@@ -289,7 +321,13 @@ class Rows:
     def _check_order(self, place: int) -> None:
         """Refuse numbers below what was no number."""
         if self._words is not None:
-            raise FileError(not_a_number(self._words[0], None, self._words[1]) + f"; line {place} has numbers again")
+            first, words = self._words
+            if words in self._dialect.above:
+                raise FileError(
+                    f"a text must hold one recording; line {first} repeats what stands above the numbers, '{printable(words, 40)}', and "
+                    f"numbers go on in line {place}; write each recording to a file of its own"
+                )
+            raise FileError(not_a_number(first, None, words) + f"; line {place} has numbers again")
         if self._blank:
             raise FileError(
                 f"a text of one column must have a number in every line; line {self._blank} is empty; write nan where a value "
