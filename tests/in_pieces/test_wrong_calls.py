@@ -10,6 +10,7 @@ import pytest
 
 import tvident
 from tvident import recordings
+from tvident._in_pieces import copied
 
 CALL: dict[str, Any] = {"angle": "angle", "torque": "torque", "sample_rate": 1000, "stiffness": "constant"}
 
@@ -59,3 +60,17 @@ def test_a_sample_rate_may_be_a_number_of_numpy(rate: Any) -> None:
     found = tvident.identify_file("rig.csv", "out.npy", **{**CALL, "sample_rate": rate})
     assert found.samples == 2000
     assert left() == ["out.npy"]
+
+
+def test_what_progress_raises_leaves_the_copy_of_the_text(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An hour of text was copied anew after an error of the caller's own."""
+
+    def progress(*_: int) -> None:
+        raise ValueError("mine")
+
+    with pytest.raises(ValueError, match="mine"):
+        tvident.identify_file("rig.csv", "found.npy", **CALL, progress=progress)
+    assert left()
+    monkeypatch.setattr(copied, "copy_text", None)
+    tvident.identify_file("rig.csv", "found.npy", **CALL)
+    assert left() == ["found.npy"]

@@ -16,6 +16,7 @@ from tvident._arguments.numbers import (
     real_number,
     whole_number,
 )
+from tvident._arguments.paths import path_of
 from tvident._arguments.progress import Progress, reporter
 from tvident._arguments.ranges import finite, percentiles, told_once
 from tvident._arguments.sampling import check_power, check_window, length_given, sample_period, seconds, window_length
@@ -71,6 +72,7 @@ __all__ = [
     "ordinal",
     "own_digits",
     "package_of",
+    "path_of",
     "percent",
     "percentiles",
     "plain",

@@ -115,7 +115,6 @@ class Expansion:
             )
         for family, size in zip(self.families, self.given_sizes, strict=True):
             if size is not None:
-                arguments.whole_number("size", size, least=1)
                 last = next(one for one in family.sizes() if one >= size)
                 if last != size:
                     some = ", ".join(str(one) for one in takewhile(partial(ge, last), family.sizes()))
@@ -193,12 +192,15 @@ class Expansion:
         given_limits : the ranges.
         ExpandedParameter.size : what was chosen.
         """
-        each: Sequence[Any] = self.size if isinstance(self.size, tuple | list) else [self.size] * self.dimensions
+        several = isinstance(self.size, tuple | list) or (isinstance(self.size, np.ndarray) and self.size.ndim > 0)
+        each: Sequence[Any] = self.size if several else [self.size] * self.dimensions  # type: ignore[assignment] # several
         if len(each) != self.dimensions:
             raise ValueError(
                 f"size must be one number for each of {self.dimensions} coordinates; got {len(each)}; give one number for all"
             )
-        return tuple(None if arguments.is_word(one, "auto") else int(one) for one in each)
+        return tuple(
+            None if arguments.is_word(one, "auto") else arguments.whole_number("size", one, least=1) for one in each
+        )
 
     @property
     def given_limits(self) -> tuple[tuple[float, float] | None, ...]:

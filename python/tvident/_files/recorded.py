@@ -352,5 +352,5 @@ def read_recording(path: str | Path) -> FileRecording:
     ('N m', 1000.0)
     >>> result = tvident.identify(recording["angle"], recording["torque"], sample_rate=recording.sample_rate)
     """
-    path = Path(path)
+    path = arguments.path_of("path", path)
     return FileRecording(read(path), source=printable(path.name))

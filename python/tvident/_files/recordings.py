@@ -9,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import cast
 
+from tvident import _arguments as arguments
 from tvident._files.channels import Channels, FileError, FileWarning, Say
 from tvident._files.names import printable
 from tvident._files.unpacked import ending_of
@@ -125,7 +126,7 @@ def read(path: str | Path) -> Channels:
     >>> list(recordings.read("rig.npz"))[:3]
     ['time [s]', 'angle [rad]', 'torque [N m]']
     """
-    path = Path(path)
+    path = arguments.path_of("path", path)
     place = printable(path)
     check_readable(path, _READERS)
     said: list[str] = []

@@ -9,6 +9,7 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _arguments as arguments
 from tvident._files.names import listed, printable
 from tvident._files.places import check_place
 from tvident._files.replacement import replaced
@@ -40,7 +41,7 @@ def _cell(name: str) -> str:
 
 def write_table(path: str | Path, columns: Mapping[str, npt.NDArray[Any]], units: Mapping[str, str]) -> None:
     """Write columns to a file of the kind that its ending says, which appears whole or not at all."""
-    path = Path(path)
+    path = arguments.path_of("path", path)
     check_place(path)
     ending = path.suffix.lower()
     if ending != ".npz":

@@ -133,6 +133,9 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
     from tvident._merged import AskedTogether, Earlier, identify_masses, identify_trials  # noqa: PLC0415
 
     _check(angle, options)
+    for name, one in (("ensemble_axis", options.ensemble_axis), ("dof_axis", options.dof_axis)):
+        if one is not None:
+            arguments.whole_number(name, one)
     axis = _axis(angle, torque, options.units)
     form = _weak(options.method)
     earlier = None if options.settings is None else Earlier.of(options.settings)

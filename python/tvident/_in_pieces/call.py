@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -143,7 +143,7 @@ def identify_file(
     >>> bool(np.array_equal(rows["stiffness"], whole.stiffness, equal_nan=True))
     True
     """
-    source_path, place = Path(path), Path(output)
+    source_path, place = arguments.path_of("path", path), arguments.path_of("output", output)
     check_output(place)
     check_apart({"the output": place}, {"the recording": source_path})
     every = arguments.whole_number("step", step, least=1)
@@ -179,7 +179,8 @@ def identify_file(
         "units": [angle_unit, torque_unit],
         "asked": [repr(method), repr(given), nan_policy, every, repr(dict(settings or {}))],
     }
-    with ExitStack() as stack, arguments.reporter(progress, "identification") as report:
+    with ExitStack() as stack, arguments.reporter(progress, "identification") as told_of:
+        report = None if told_of is None else _Watched(told_of)
         source, kept = _opened(source_path, place, told, mark if is_text else None)
         stack.callback(kept.close)
         stack.callback(source.close)
@@ -195,7 +196,8 @@ def identify_file(
             return Run(asked, kept, LONG_PIECE if asked.is_narrow else PIECE, place, report).all()
         except BaseException as error:
             # The copy of a text is of use to the same call alone, which such an error would end again.
-            if kept.is_empty or (isinstance(error, _WRONG) and not kept.has_results):
+            is_wrong = isinstance(error, _WRONG) and (report is None or error is not report.error)
+            if kept.is_empty or (is_wrong and not kept.has_results):
                 kept.remove()
             raise
 
@@ -211,6 +213,22 @@ def _check_named(names: Mapping[str, object], others: Mapping[str, object], sett
         raise TypeError(
             f"settings must be those of an earlier result; got {arguments.shown(settings)}; pass result.settings"
         )
+
+
+class _Watched:
+    """What is told of the work done, and the error that it raised: the recording and the call may be right."""
+
+    def __init__(self, report: Callable[[int, int], object]) -> None:
+        self._report = report
+        self.error: BaseException | None = None
+
+    def __call__(self, done: int, total: int) -> object:
+        """Tell, and keep what is raised."""
+        try:
+            return self._report(done, total)
+        except BaseException as error:
+            self.error = error
+            raise
 
 
 _WRONG = (FileError, ValueError, TypeError, KeyError)

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _arguments as arguments
 from tvident._files import FileError, printable, read_result
 from tvident._merged.elements import Element
 from tvident._merged.merging import Identifiable, Merging
@@ -61,7 +62,7 @@ def load(path: str | Path) -> Any:
     >>> bool((tvident.load("result.npz").stiffness == result.stiffness).all())
     True
     """
-    arrays, text = read_result(Path(path))
+    arrays, text = read_result(arguments.path_of("path", path))
     place = printable(path)
     try:
         facts = json.loads(text)

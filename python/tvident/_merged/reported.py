@@ -360,9 +360,10 @@ class Reported(MergedSimulated, Telling, Tabular):
         tvident.load : reads it back.
         Identification.save : of one record.
         """
-        if Path(path).suffix in RESULT_ENDINGS:
-            store(Path(path), self)
+        place = arguments.path_of("path", path)
+        if place.suffix in RESULT_ENDINGS:
+            store(place, self)
         else:
-            check_beside(Path(path))
-            write_table(path, self.columns(), self.units)
-            write_settings(Path(path), self.settings)
+            check_beside(place)
+            write_table(place, self.columns(), self.units)
+            write_settings(place, self.settings)

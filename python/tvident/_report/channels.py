@@ -18,7 +18,7 @@ from tvident._units import in_words_of, named_unit, unit_said
 
 def check_page(path: str | Path) -> None:
     """Refuse a name that is not that of a page."""
-    if Path(path).suffix.lower() not in {".html", ".htm"}:
+    if arguments.path_of("path", path).suffix.lower() not in {".html", ".htm"}:
         raise ValueError(f"a report is a page: its name must end in .html; got {arguments.shown(str(path))}; rename it")
 
 

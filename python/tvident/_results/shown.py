@@ -120,13 +120,14 @@ class Shown(Simulated, Telling, Valued):
         tvident.load : reads it back.
         identify_file : writes while it computes, for recordings longer than memory.
         """
-        if Path(path).suffix in RESULT_ENDINGS:
+        place = arguments.path_of("path", path)
+        if place.suffix in RESULT_ENDINGS:
             rest = {"terms": list(self.terms), "jumps": self.jumps, "words": plain_words(self._told)}
-            store(Path(path), self._table(), self._found, rest)
+            store(place, self._table(), self._found, rest)
         else:
-            check_beside(Path(path))
-            write_table(path, self.columns(), self.units)
-            write_settings(Path(path), self.settings)
+            check_beside(place)
+            write_table(place, self.columns(), self.units)
+            write_settings(place, self.settings)
 
     def summary(self) -> str:
         """Return a table of the parameters, and in words what was chosen and what to do.

@@ -41,6 +41,7 @@ def shaped(name: str, values: Any, axis: int) -> Shaped:
     ValueError
         If time is to be the columns of a table.
     """
+    axis = arguments.whole_number("axis", axis)
     if isinstance(values, np.ndarray) and values.dtype.names and _are_numbers(values):
         _check_rows(name, axis)
         fields = values.dtype.names
