@@ -193,8 +193,12 @@ class Improvement(_AskedOfRecord):
         if not (_is_contradicted(self.found) or self.found.record_status & Status.RANK_DEFICIENT):
             return self._without_worse_offset(result, words)
         trial = self._trial(result)
-        remedy = trial.remedy()
-        advice, suspects = self._exchanged(result) if remedy is None else remedy.words, self._suspects
+        remedy, exchanged = trial.remedy(), None
+        if remedy is None or remedy.share > NEXT_TO_NOTHING:
+            # Of a slow machine a lag explains most of what swapped channels leave.
+            exchanged = self._exchanged(result)
+            remedy = remedy if exchanged is None else None
+        advice, suspects = exchanged if remedy is None else remedy.words, self._suspects
         if advice is None and (undoubted := trial.undoubted([one.name for one in self._explained.suspects])):
             suspects, advice = [undoubted[0]], undoubted[1]
         if advice is None:

@@ -65,12 +65,15 @@ class Remedy:
         All unknowns that there were, and one more, can be distinguished.
     is_settled : bool
         Nothing contradicts it.
+    share : float
+        Of what is held back, which it does not predict.
     """
 
     ratio: float
     words: str
     distinguishes: bool
     is_settled: bool = False
+    share: float = 0.0
 
     @property
     def separates(self) -> bool:
@@ -169,10 +172,10 @@ class Trial:
         else:
             return None
         left, result = left_of[best], found[best]
-        if not holds(left.least.share, result.record_status):
+        if not (holds(left.least.share, result.record_status) and left.least.share < 1):
             return None
         words = f"{self._suspicion(best, result)}: try {self._change(best, result)}; {left}{self._moved(result)}"
-        return Remedy(left.ratio, words, are_distinguished(result.record_status))
+        return Remedy(left.ratio, words, are_distinguished(result.record_status), share=left.least.share)
 
     def _beside_constant_stiffness(self) -> Remedy | None:
         """Return that the stiffness need not change beside what does, where that predicts more, or as much with far smaller errors.
@@ -189,7 +192,8 @@ class Trial:
         if not is_worth_it or self._feeds_energy(found):
             return None
         words = f"stiffness need not change: try stiffness='constant'; {left}{known}{self._moved(found, is_more=False)}"
-        return Remedy(min(left.ratio, AS_GOOD), words, distinguishes=False, is_settled=True)
+        ratio = min(left.ratio, AS_GOOD)
+        return Remedy(ratio, words, distinguishes=False, is_settled=True, share=left.least.share)
 
     def _better_known(self, found: Identification) -> str:
         """Return which constant another result knows far better, in words."""
@@ -384,7 +388,7 @@ class Trial:
         # With an unknown less the others are told apart whatever the truth is.
         is_more = bool(chosen) and not is_none
         distinguishes = is_more and are_distinguished(flags if is_simple else free.record_status)
-        return Remedy(best.ratio, said, distinguishes, is_settled=is_settled)
+        return Remedy(best.ratio, said, distinguishes, is_settled=is_settled, share=best.least.share)
 
     def _follows_time(self, call: Call, names: Sequence[str]) -> bool:
         """Return whether coefficients that were found to change grow with time beyond chance, along a cubic, where all else is constant.
