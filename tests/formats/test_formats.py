@@ -148,6 +148,32 @@ def test_matlab_structures_are_channels_with_units(tmp_path: Path) -> None:
     assert found["torque"] is found["rig.torque"]
 
 
+@pytest.mark.parametrize("is_across", [False, True])
+def test_columns_of_a_matrix_are_called_as_the_list_beside_it_says(tmp_path: Path, is_across: bool) -> None:
+    """They were data.0, data.1 and data.2, without a word of the list and of its units."""
+    matrix = np.stack([1e3 * examples.T, examples.ANGLE, examples.TORQUE], axis=1)
+    matrix = matrix.T if is_across else matrix
+    labels = np.array([["Time (ms)", "Ankle angle (deg)", "Moment (N m)"]], object)
+    savemat(tmp_path / "x.mat", {"data": matrix, "labels": labels, "subject": "7"})
+    found = tvident.read_recording(tmp_path / "x.mat")
+    assert found.units == {"Time": "ms", "Ankle angle": "deg", "Moment": "N m"}
+    assert found.sample_rate == pytest.approx(250)
+    np.testing.assert_array_equal(found["Ankle angle"], examples.ANGLE)
+    imported = {
+        "data": matrix,
+        "colheaders": np.array([["t", "q", "q"]], object),
+        "units": np.array([["s", "rad", "deg"]], object),
+    }
+    savemat(tmp_path / "x.mat", {"A": imported})
+    assert list(tvident.read_recording(tmp_path / "x.mat").units.items()) == [
+        ("A.t", "s"),
+        ("A.q [rad]", "rad"),
+        ("A.q [deg]", "deg"),
+    ]
+    savemat(tmp_path / "x.mat", {"data": matrix, "labels": labels[:, :2], "subjects": labels})
+    assert next(iter(tvident.read_recording(tmp_path / "x.mat"))) == "data.0"
+
+
 def test_a_matlab_file_that_was_cut_says_that_more_may_be_lost(tmp_path: Path) -> None:
     names = ("time", "angle", "torque")
     savemat(tmp_path / "whole.mat", dict(zip(names, (examples.T, examples.ANGLE, examples.TORQUE), strict=True)))

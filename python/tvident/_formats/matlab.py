@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -27,6 +28,10 @@ _UNITS = ("unit", "units")
 """Fields of a structure that is one channel."""
 _NAMES = ("name", "names", "label", "channel", "channelname", "signalname", "title", "blockname")
 """Fields of an array of structures that call its channels; a scope of Simulink has a label, which may be empty, and a name of a block."""
+_COLUMNS = re.compile(
+    r"(col|column|chan|channel|signal|var|variable)?_?(names?|labels?|headers?|titles?)|channels|signals|columns"
+)
+"""What a list of the columns of a matrix beside it is called, as ``importdata`` has it in ``colheaders``."""
 _SHAPES = ("dimensions",)
 """What Simulink says beside the samples."""
 
@@ -73,6 +78,7 @@ def _flat(prefix: str, variables: Mapping[str, Any]) -> Iterator[tuple[str, Any]
     if of_dspace:
         yield from ((prefix + name, value) for name, value in of_dspace)
         return
+    fields = _by_column(fields)
     units: Mapping[str, Any] = next((fields[name] for name in _UNITS if isinstance(fields.get(name), Mapping)), {})
     for name, value in fields.items():
         if value is units and units:
@@ -91,6 +97,47 @@ def _flat(prefix: str, variables: Mapping[str, Any]) -> Iterator[tuple[str, Any]
         samples, unit, rest = channel
         yield _with_unit(f"{prefix}{name}", unit), samples
         yield from _flat(f"{prefix}{name}.", rest)
+
+
+def _by_column(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Return variables with the columns of matrices by name, where a list beside them calls as many as these have."""
+    lists = {name: words for name, value in fields.items() if (words := _words(value))}
+    called = next((one for name, one in lists.items() if _COLUMNS.fullmatch(name.lower())), [])
+    matrices = [name for name, value in fields.items() if len(called) > 1 and _has_columns(value, len(called))]
+    if not matrices:
+        return dict(fields)
+    units = next((one for name, one in lists.items() if name.lower() in _UNITS and len(one) == len(called)), None)
+    found: dict[str, Any] = {}
+    for name, value in fields.items():
+        if name not in matrices:
+            found[name] = value
+            continue
+        columns = value.T if value.shape[1] == len(called) else value
+        for place, (one, samples) in enumerate(zip(called, columns, strict=True)):
+            own = one if len(matrices) == 1 else f"{name}.{one}"
+            full = _with_unit(own, units[place] if units else "")
+            found[full if full not in found and full not in fields else f"{name}.{place}.{full}"] = samples
+    return found
+
+
+def _words(value: Any) -> list[str]:
+    """Return the cells of a list of words without blanks around them; nothing where it is none."""
+    cells = (
+        value.tolist()
+        if getattr(getattr(value, "dtype", None), "kind", "") in "UO" and hasattr(value, "tolist")
+        else value
+    )
+    while isinstance(cells, list) and len(cells) == 1:
+        cells = cells[0]
+    is_words = isinstance(cells, list) and all(map(_is_word, cells))
+    return [str(cell).strip() for cell in cells] if is_words else []
+
+
+def _has_columns(value: Any, count: int) -> bool:
+    """Return whether a matrix of numbers has so many columns, or rows."""
+    shape = getattr(value, "shape", ())
+    is_matrix = len(shape) == 2 and value.dtype.kind in "biuf"  # noqa: PLR2004 - rows and columns
+    return is_matrix and count in shape and max(shape) > count
 
 
 def _with_unit(name: str, unit: Any) -> str:
