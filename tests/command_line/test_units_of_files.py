@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -53,3 +54,40 @@ def test_units_that_cannot_be_converted_are_a_line_and_a_status(tmp_path: Path) 
     times = run(*f"derivatives {tmp_path}/x.csv --channel angle --time t -o {tmp_path}/y.csv".split())
     assert times.returncode == 0, times.stderr
     assert np.loadtxt(tmp_path / "y.csv", delimiter=",", skiprows=1)[1, 0] == pytest.approx(0.001)
+
+
+def test_the_unit_of_a_channel_that_is_multiplied_is_kept_or_asked_for(tmp_path: Path) -> None:
+    """--torque-scale -1, which advice names, took mN m for N m: an inertia of 12.3 kg m^2 for 0.0123, without a word."""
+    table = np.column_stack([COLUMNS[:, :2], -1e3 * RIG.torque])
+    np.savetxt(tmp_path / "x.csv", table, delimiter=",", header="t [ms],angle [deg],torque [mN m]", comments="")
+    call = f"identify {tmp_path}/x.csv --angle angle --torque torque --time t --stiffness constant".split()
+    done = run(*call, "--torque-scale", "-1")
+    assert done.returncode == 0, done.stderr
+    expected = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, stiffness="constant").constants["inertia"][0]
+    assert float(done.stdout.split("inertia = ")[1].split()[0]) == pytest.approx(expected, rel=1e-6)
+    # What converts the unit has converted it.
+    converted = run(*call, "--torque-scale", "-1", "--angle-scale", "0.0174533")
+    assert float(converted.stdout.split("inertia = ")[1].split()[0]) == pytest.approx(expected, rel=1e-4)
+    asked = run(*call, "--torque-scale", "-0.5")
+    assert asked.returncode == 2
+    assert (
+        "the torque is in 'mN m' and multiplied by -0.5; give --torque-unit 'mN m', or --torque-unit 'N m'"
+        in asked.stderr
+    )
+    half = run(*call, "--torque-scale", "-0.5", "--torque-unit", "mN m")
+    assert float(half.stdout.split("inertia = ")[1].split()[0]) == pytest.approx(expected / 2, rel=1e-6)
+    compared = run("compare", *call[1:], "--torque-scale", "-1")
+    assert f"{expected:.3g}" in compared.stdout
+
+
+def test_methods_are_compared_in_the_units_of_a_truth(tmp_path: Path) -> None:
+    """Beside degrees every method was 98 % off, and so is a rate of times in ms."""
+    columns = [1e3 * RIG.time, np.rad2deg(RIG.angle), RIG.torque, RIG.inertia, RIG.damping, RIG.stiffness]
+    header = "t [ms],angle [deg],torque [N m],inertia,damping,stiffness"
+    np.savetxt(tmp_path / "x.csv", np.column_stack(columns), delimiter=",", header=header, comments="")
+    call = ["compare", "x.csv", "--methods", "--angle", "angle", "--torque", "torque", "--time", "t", "--json"]
+    done = run(*call, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    first = json.loads(done.stdout)["methods"][0]
+    assert first["method"] == "tvident"
+    assert max(value for name, value in first.items() if name in {"inertia", "damping", "stiffness"}) < 5

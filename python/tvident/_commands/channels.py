@@ -156,27 +156,6 @@ def _is_file(name: str) -> bool:
         return False
 
 
-def scaled(
-    values: npt.NDArray[Any], scale: str | None, channels: recordings.Channels, file: str | None
-) -> npt.NDArray[Any]:
-    """Multiply by a number, or by a variable of the file."""
-    if scale is None:
-        return values
-    try:
-        factor: Any = float(scale)
-    except ValueError:
-        factor = recordings.channel(channels, scale, file or "the command line")
-    else:
-        if not np.isfinite(factor):
-            raise click.UsageError(f"a scale must be finite; got {scale}; give a number such as 0.001")
-    if np.ndim(factor) and factor.shape != values.shape:
-        raise click.UsageError(
-            f"a scale must be one number, or have one value for every sample; {scale!r} has {factor.size} values "
-            f"for {values.size} samples; use another variable"
-        )
-    return np.asarray(np.asarray(values) * factor)
-
-
 def mask_of(values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
     """Return where a channel is neither zero nor missing."""
     return np.asarray((values != 0) & np.isfinite(values))

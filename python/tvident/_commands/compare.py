@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -13,14 +13,13 @@ import numpy as np
 import numpy.typing as npt
 
 import tvident
-from tvident import baselines
+from tvident import baselines, recordings
 from tvident._commands import plain
 from tvident._commands.channels import (
     channel_of,
     channels_in,
     check_has_times,
     mask_of,
-    scaled,
     source_of,
     times_of,
 )
@@ -28,8 +27,10 @@ from tvident._commands.equation import lag_of, parameter_of, terms_of
 from tvident._commands.given import check_time, given
 from tvident._commands.named import named
 from tvident._commands.output import PICTURE, RECORDING, RESULTS, check_outputs, give, save_figure
+from tvident._commands.scales import scaled
 from tvident._commands.words import in_options
 from tvident._equation import COEFFICIENTS
+from tvident._units import axis_of
 
 
 # Options that need work before they are passed on are parameters of their own.
@@ -61,24 +62,29 @@ def compare(
         name: parameter_of(value, channels, file) if name in COEFFICIENTS else value
         for name, value in given(options).items()
     }
+    if methods and (models or plot or lag or mask):
+        raise click.UsageError(
+            "--methods compares methods alone; got options of models; leave --model, --plot, --lag and --mask out"
+        )
+    scales = {"angle": angle_scale, "torque": torque_scale}
+    signals = [
+        scaled(
+            source_of(channels, one, file), scales[name], channels, file, quantity=name, unit=common.get(f"{name}_unit")
+        )
+        for name, one in (("angle", angle), ("torque", torque))
+    ]
+    times = times_of(channels, time_channel, angle, file)
     if methods:
-        if models or plot or lag or mask:
-            raise click.UsageError(
-                "--methods compares methods alone; got options of models; leave --model, --plot, --lag and --mask out"
-            )
-        _methods(file, (angle, torque, time_channel), (angle_scale, torque_scale), options, output, as_json=as_json)
+        _methods(channels, [*signals, times], common, output, as_json=as_json)
         return
     if lag is not None:
         common["lag"] = lag_of(lag)
     if mask is not None:
         common["mask"] = mask_of(source_of(channels, mask, file))
-    signals = [source_of(channels, name, file) for name in (angle, torque)]
-    times = times_of(channels, time_channel, angle, file)
     if times is not None:
         common["t"] = times
     result = tvident.compare_models(
-        scaled(signals[0], angle_scale, channels, file),
-        scaled(signals[1], torque_scale, channels, file),
+        *signals,
         models={name: {"terms": terms_of(tuple(name.split(",")))} for name in models} or None,
         **common,
     )
@@ -111,27 +117,26 @@ def _rows(table: Mapping[str, npt.NDArray[Any]]) -> list[dict[str, Any]]:
 
 
 def _methods(
-    file: str | None,
-    names: tuple[str, str, str | None],
-    scales: tuple[str | None, str | None],
-    options: dict[str, Any],
+    channels: recordings.Channels,
+    signals: Sequence[Any],
+    common: Mapping[str, Any],
     output: str | None,
     *,
     as_json: bool,
 ) -> None:
-    """Compare methods on one recording."""
-    channels = channels_in(file)
-    angle, torque = (
-        np.asarray(scaled(source_of(channels, name, file), scale, channels, file))
-        for name, scale in zip(names[:2], scales, strict=True)
+    """Compare methods on one recording, in rad, N m and s, as a truth that the file may hold is."""
+    angle, torque, times = signals
+    axis = axis_of(
+        angle, torque, times, **{name: common.get(name) for name in ("angle_unit", "torque_unit", "time_unit")}
     )
-    times = times_of(channels, names[2], names[0], file)
-    rate = options["sample_rate"] or (1 / options["delta"] if options["delta"] else None)
-    rate = rate or 1 / float(np.median(np.diff(np.asarray(times, np.float64))))
+    rate = common.get("sample_rate") or (1 / common["delta"] if "delta" in common else None)
+    rate = rate or 1 / (axis.time * float(np.median(np.diff(np.asarray(times, np.float64)))))
     known = {}
     for name in COEFFICIENTS:
         with suppress(KeyError):
-            known[name] = np.asarray(channel_of(channels, name, file))
+            known[name] = np.asarray(channel_of(channels, name, None))
     truth = known if len(known) == len(COEFFICIENTS) else None
-    found = baselines.compare_methods(angle, torque, sample_rate=rate, truth=truth)
+    found = baselines.compare_methods(
+        np.asarray(angle) * axis.angle, np.asarray(torque) * axis.torque, sample_rate=rate, truth=truth
+    )
     give(found.table, {}, plain.as_json({"methods": _rows(found.table)}) if as_json else found.summary(), output)

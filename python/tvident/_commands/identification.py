@@ -11,11 +11,12 @@ import numpy.typing as npt
 
 import tvident
 from tvident import recordings
-from tvident._commands.channels import channel_of, check_has_times, mask_of, scaled, source_of, times_of
+from tvident._commands.channels import channel_of, check_has_times, mask_of, source_of, times_of
 from tvident._commands.equation import lag_of, parameter_of, terms_of
 from tvident._commands.given import check_time, given, period_of, wanted_progress
 from tvident._commands.method import NAMES, method_of
 from tvident._commands.output import RECORDING
+from tvident._commands.scales import scaled
 from tvident._commands.settings import read_settings
 from tvident._equation import COEFFICIENTS
 from tvident._units import axis_of
@@ -75,8 +76,12 @@ def identified(
     times = times_of(channels, time_channel, next(iter(named.values())), file)
     signals = dict(zip(named, recorded, strict=False))
     if "angle" in signals:
-        signals["angle"] = scaled(signals["angle"], angle_scale, channels, file)
-    signals["torque"] = scaled(recorded[-1], torque_scale, channels, file)
+        signals["angle"] = scaled(
+            signals["angle"], angle_scale, channels, file, quantity="angle", unit=options.get("angle_unit")
+        )
+    signals["torque"] = scaled(
+        recorded[-1], torque_scale, channels, file, quantity="torque", unit=options.get("torque_unit")
+    )
     scales = {"angle": angle_scale, "torque": torque_scale}
     _say_assumed({name: one for name, one in signals.items() if scales.get(name) is None}, times, options)
     result = tvident.identify(
