@@ -252,8 +252,17 @@ def test_slices_keep_their_unit_and_what_is_computed_has_none() -> None:
     for same in (angle[2:5], angle.copy(), pickle.loads(pickle.dumps(angle))):  # noqa: S301 - our own
         assert isinstance(same, Channel)
         assert same.unit == "deg"
-    for computed in (angle * 2, np.diff(angle), np.deg2rad(angle), angle.mean(keepdims=True)):
+    for computed in (angle * 2, angle**2, np.deg2rad(angle), angle.mean(keepdims=True)):
         assert not isinstance(computed, Channel)
+    for kept in (-angle, angle - angle.mean(), angle - angle[0], 1 + angle, np.abs(angle), np.diff(angle)):
+        assert isinstance(kept, Channel)
+        assert kept.unit == "deg"
+    np.testing.assert_array_equal(angle - angle[0], np.arange(10.0))
+    for other in (angle - Channel(angle, "rad"), np.add.reduce(angle), np.subtract.outer(angle, angle)):
+        assert not isinstance(other, Channel)
+    moved = angle.copy()
+    moved -= 1
+    assert moved.unit == "deg"
     turned = angle.to("rad")
     assert turned.unit == "rad"
     np.testing.assert_allclose(turned, np.deg2rad(np.arange(10.0)))

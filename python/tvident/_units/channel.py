@@ -13,6 +13,9 @@ from tvident._units.names import named_unit
 from tvident._units.parse import unit_of
 from tvident._units.quantities import UnitError
 
+_SIGNS, _SUMS = (np.negative, np.positive, np.absolute, np.fabs), (np.add, np.subtract)
+"""What leaves the unit as it is; sums where whatever is added has no other."""
+
 _JOINED = (np.concatenate, np.stack, np.vstack, np.hstack, np.column_stack)
 
 
@@ -25,7 +28,8 @@ def _check_text(unit: object) -> None:
 class Channel(np.ndarray[Any, Any]):
     """Samples with their unit, as :func:`tvident.read_recording` gives them: an array in every other way.
 
-    Slices, copies and what is joined of one unit keep the unit. What is computed from samples is a plain array, since its unit is another.
+    Slices, copies and what is joined of one unit keep the unit, and so do signs and sums: ``-torque``, ``angle - angle.mean()``,
+    ``t - t[0]``. What else is computed from samples is a plain array, since its unit is another.
 
     Attributes
     ----------
@@ -70,11 +74,13 @@ class Channel(np.ndarray[Any, Any]):
         self.unit = getattr(other, "unit", "")
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Any:
-        """Compute with plain arrays: a product or a mean of channels has another unit, or none."""
+        """Compute with plain arrays: a product or a mean of channels has another unit, or none; a sign and a sum keep it."""
+        unit = _kept(ufunc, method, inputs)
         if "out" in kwargs:
             kwargs["out"] = tuple(np.asarray(one) if isinstance(one, Channel) else one for one in kwargs["out"])
         plain = (np.asarray(one) if isinstance(one, Channel) else one for one in inputs)
-        return getattr(ufunc, method)(*plain, **kwargs)
+        made = getattr(ufunc, method)(*plain, **kwargs)
+        return Channel(made, unit) if unit and isinstance(made, np.ndarray) else made
 
     def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
         """Keep the unit where channels of one unit are joined: what was not computed has no other."""
@@ -117,6 +123,14 @@ class Channel(np.ndarray[Any, Any]):
 
     def __reduce__(self) -> Any:
         return Channel, (np.asarray(self), self.unit)
+
+
+def _kept(ufunc: Any, method: str, inputs: tuple[Any, ...]) -> str:
+    """Return the unit that what is computed still has; an empty string where it has another, or none."""
+    if method != "__call__" or ufunc not in (*_SIGNS, *_SUMS):
+        return ""
+    units = {one.unit for one in inputs if isinstance(one, Channel)}
+    return units.pop() if len(units) == 1 else ""
 
 
 def unit_said(values: Any) -> str:
