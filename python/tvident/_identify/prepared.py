@@ -25,7 +25,17 @@ from tvident._identify.signals import Signals, channels_of_motion, even_times, i
 from tvident._identify.task import Task
 from tvident._identify.together import sampled
 from tvident._identify.weighted import Weights, usable_channels, weights_of
-from tvident._units import ROTARY, Axis, axis_of, factor_between, factor_of_derivative, scaled, unit_said
+from tvident._units import (
+    ROTARY,
+    Axis,
+    UnitError,
+    axis_of,
+    factor_between,
+    factor_of_derivative,
+    has_unit_in_attributes,
+    scaled,
+    unit_said,
+)
 
 
 # One step after the other, each with what all before it found.
@@ -199,7 +209,18 @@ def _factor_of(name: str, values: Any, axis: Axis) -> float:
     if name == "angle":
         return axis.angle
     said = unit_said(values)
-    return factor_of_derivative(axis.system, name, said) if said else 1.0
+    factor = factor_of_derivative(axis.system, name, said) if said else 1.0
+    _check_attribute(name, values, said, factor)
+    return factor
+
+
+def _check_attribute(name: str, values: Any, unit: str, factor: float) -> None:
+    """Refuse a unit that only an attribute says, which arithmetic keeps, where numbers would be converted."""
+    if factor != 1 and has_unit_in_attributes(values):
+        raise UnitError(
+            f"{name} must be in the unit of results where only an attribute says {unit!r}: arithmetic keeps attributes, so nobody knows "
+            f"whether the numbers still are; pass tvident.Channel({name}, {unit!r}), or .to_numpy() if they were converted"
+        )
 
 
 def _in_units_of_results(name: str, value: float | None, factor: float) -> float | None:
@@ -212,4 +233,5 @@ def _known(name: str, value: Any, axis: Axis) -> Any:
     said = unit_said(value)
     units = UNITS if axis.system is ROTARY else LINEAR_UNITS
     factor = factor_between(said, units[name], name=f"a known {name}") if said else 1.0
+    _check_attribute(name, value, said, factor)
     return value if factor == 1 else scaled(np.asarray(value), factor)

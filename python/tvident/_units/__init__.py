@@ -1,7 +1,7 @@
 """Reads units as headers of recordings write them, and converts to rad, N m and s."""
 
 from tvident._units.axis import Axis, axis_of, factor_said, scaled, times_in_seconds
-from tvident._units.channel import Channel, in_its_unit, unit_named, unit_said
+from tvident._units.channel import Channel, has_unit_in_attributes, in_its_unit, unit_named, unit_said
 from tvident._units.names import derivative_units, named_unit, with_unit
 from tvident._units.parse import Unit, is_unit, unit_of
 from tvident._units.quantities import (
@@ -32,6 +32,7 @@ __all__ = [
     "factor_of_derivative",
     "factor_said",
     "factor_to",
+    "has_unit_in_attributes",
     "in_its_unit",
     "in_words_of",
     "is_convertible",

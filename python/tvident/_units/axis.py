@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from tvident._units.channel import in_its_unit, unit_named, unit_said
+from tvident._units.channel import has_unit_in_attributes, in_its_unit, unit_named, unit_said
 from tvident._units.quantities import LINEAR, ROTARY, System, UnitError, factor_to, is_convertible, system_of
 
 # What has no place to say a unit: the only ones that come a thousand times a second.
@@ -69,6 +69,10 @@ def axis_of(
     for name in named:
         if units[name]:
             _check_named(system, name, units[name])
+    for name, unit in given.items():
+        # Coordinates of time say their unit in no other way, and hardly anybody computes with them.
+        if name != "time" and not unit and has_unit_in_attributes(values[name]):
+            _check_named(system, name, units[name], by="an attribute", what="arithmetic keeps attributes")
     factors = {name: factor_to(system, name, unit, name=f"the {name}") for name, unit in units.items()}
     return Axis(system, **factors, assumed=frozenset(name for name, unit in units.items() if not unit))
 
@@ -84,18 +88,27 @@ def factor_said(system: System, name: str, values: Any) -> float:
     if type(values) in _WITHOUT_UNIT:
         return 1.0
     unit = unit_said(values)
+    if has_unit_in_attributes(values):
+        _check_named(system, name, unit, by="an attribute", what="arithmetic keeps attributes")
     if unit:
         return factor_to(system, name, unit, name=f"the {name}")
     _check_named(system, name, unit_named(values))
     return 1.0
 
 
-def _check_named(system: System, name: str, unit: str) -> None:
-    """Refuse a unit that only a name says, where the numbers may have been converted since."""
+def _check_named(
+    system: System,
+    name: str,
+    unit: str,
+    *,
+    by: str = "its name",
+    what: str = "what is computed from a series keeps the name",
+) -> None:
+    """Refuse a unit that only a name or an attribute says, where the numbers may have been converted since."""
     wanted = system.units[name]
     if is_convertible(system, name, unit) and factor_to(system, name, unit, name=f"the {name}") != 1:
         raise UnitError(
-            f"the {name} must say its unit where its name says {unit!r}: what is computed from a series keeps the name, so nobody knows "
+            f"the {name} must say its unit where {by} says {unit!r}: {what}, so nobody knows "
             f"whether the numbers still are; give {name}_unit={unit!r}, or {name}_unit={wanted!r} if they were converted, or pass "
             f".to_numpy() in {wanted}"
         )

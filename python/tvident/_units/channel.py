@@ -152,6 +152,17 @@ def unit_said(values: Any) -> str:
     if isinstance(values, np.ndarray):
         said = getattr(values, "units", None) or getattr(values, "unit", None)
         return "" if said is None else str(said)
+    return _in_attributes(values)
+
+
+def has_unit_in_attributes(values: Any) -> bool:
+    """Return whether an attribute of a container alone says its unit: what is computed from it keeps the attribute."""
+    if isinstance(values, list | tuple):
+        return bool(values) and has_unit_in_attributes(values[0])
+    return not isinstance(values, np.ndarray) and not hasattr(values, "magnitude") and bool(_in_attributes(values))
+
+
+def _in_attributes(values: Any) -> str:
     attributes = getattr(values, "attrs", None)
     if not isinstance(attributes, Mapping):
         return ""
