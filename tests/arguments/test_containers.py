@@ -72,6 +72,7 @@ def test_several_records_have_time_where_the_container_says() -> None:
     ("pair", "message"),
     [
         ((np.stack([ANGLE] * 3, -1), np.stack([TORQUE] * 3, -1)), r"time must be the last axis; .* pass angle\.T and"),
+        ((np.zeros(80), np.zeros(400)), r"got \(80,\) and \(400,\); .* give both: sample_rate=\(200, 1000\), say"),
         ((np.zeros((5, 80)), np.zeros((80, 5))), "angle and torque must have the same shape; .*; transpose one of"),
         ((pd.Series(ANGLE, index=DATES), pd.Series(TORQUE, index=DATES[::-1])), r"same samples; .*\.reindex\(angle"),
         ((pd.Series(ANGLE)[: N // 2], pd.Series(TORQUE)[N // 2 :]), r"same samples; .* sample 0 are 0 and 500; pass"),
@@ -83,7 +84,7 @@ def test_several_records_have_time_where_the_container_says() -> None:
             "same samples; along 'time' .* xarray.align",
         ),
     ],
-    ids=["time first", "transposed", "dates", "cut elsewhere", "coordinates"],
+    ids=["time first", "two rates", "transposed", "dates", "cut elsewhere", "coordinates"],
 )
 def test_what_does_not_belong_together_is_refused(pair: tuple[Any, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):

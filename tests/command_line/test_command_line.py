@@ -290,6 +290,20 @@ GOOD = ("--angle", "angle", "--torque", "torque", "--sample-rate", "1000")
         (("identify", "FILE", *GOOD, "-o", "no/such/folder/r.csv"), 1, "no/such/folder: there is no such folder"),
         (("identify", "FILE", *GOOD, "--plot", "no/such/folder/r.png"), 1, "no/such/folder: there is no such folder"),
         (("identify", "FILE", *GOOD, "-o", "folder.csv"), 2, "'folder.csv' is a directory"),
+        (("identify", "FILE", *GOOD, "--angle-scale", "0,5"), 2, "or write a number with a point, as 0.5"),
+        (
+            ("identify", "FILE", *GOOD, "--stiffness", "konstant"),
+            2,
+            "or write one of windowed, constant, auto, varying",
+        ),
+        (
+            ("identify", "FILE", *GOOD, "--sample-rate", "500,0"),
+            2,
+            "write 500 or '0.5 kHz'; the decimal sign is a point",
+        ),
+        (("identify", "FILE", *GOOD, "--sample-rate", "5 ms"), 2, "'5 ms' is no number that is known; write 500 or"),
+        (("plan", "--sample-rate", "fast"), 2, "'fast' is no number that is known"),
+        (("live", "FILE", "--angle", "a", "--torque", "b"), 2, "live takes what is piped in, as -; got"),
         (("identify", "FILE", *GOOD, "--angle-scale", "inf"), 2, "a scale must be finite; got inf"),
         (("identify", "few.npz", *GOOD, "--angle-scale", "few"), 2, "'few' has 3 values for 300 samples"),
         (("identify", "FILE", *GOOD, "--step", "99999999999999999999"), 2, "step must be less than 2^63"),
@@ -336,3 +350,13 @@ def test_a_channel_is_found_beside_a_file_of_its_name(recording: Path, tmp_path:
     (tmp_path / "angle").write_text("not a recording")
     done = run("identify", recording, *GOOD, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("rate", ["1000 Hz", "1kHz", "1e3"])
+def test_a_sample_rate_may_have_its_unit(recording: Path, rate: str) -> None:
+    """'1 kHz' was "not a valid float"."""
+    plain, said = (
+        run("identify", recording, "--angle", "angle", "--torque", "torque", "--sample-rate", one).stdout
+        for one in ("1000", rate)
+    )
+    assert plain == said != ""

@@ -137,6 +137,13 @@ def test_numbers_that_are_not_plausible_are_asked_about() -> None:
     assert "stiffness" in reversed_sign
 
 
+def test_times_that_count_samples_are_asked_about() -> None:
+    """A counter heard "milliseconds?" alone, which is right at 1 kHz only."""
+    counted = advice(RIG.angle, RIG.torque, sample_rate=None, t=np.arange(1, 1 + RIG.angle.size))
+    assert "time_unit='ms' with t= or delta=; if it counts samples, give sample_rate= in its place" in counted
+    assert "counts samples" not in advice(RIG.angle, RIG.torque, sample_rate=None, t=1e2 * RIG.time)
+
+
 @pytest.mark.parametrize(
     ("factor", "first", "word", "unit"),
     [

@@ -99,6 +99,8 @@ class Plausible:
         if len(possible) == 1:
             [(word, unit)] = possible
             question = f"{word}? Then give time_unit='{unit}' with t= or delta="
+            if math.isclose(self.period, 1, rel_tol=1e-6):
+                question += "; if it counts samples, give sample_rate= in its place"
         else:
             words = " or ".join(f"{one[0]} ({_in_words(rates[one])})" for one in possible)
             units = " or ".join(f"time_unit='{unit}'" for _, unit in possible)

@@ -39,6 +39,8 @@ def channels(**values: npt.ArrayLike) -> list[npt.NDArray[np.number]]:
             return [array.reshape(-1) for array in arrays.values()]
         one, *_, other = shapes.values()
         cure = "transpose one of them" if one == other[::-1] else "cut or reshape one of them"
+        if list(shapes) == ["angle", "torque"] and len(one) == len(other) == 1:
+            cure += ", or, where their rates differ, give both: sample_rate=(200, 1000), say"
         raise ValueError(f"{' and '.join(shapes)} must have the same shape; got {one} and {other}; {cure}")
     shape = next(iter(shapes.values()))
     if len(shape) > 1 and shape[-1] < _NO_RECORD <= shape[0]:

@@ -9,12 +9,23 @@ import click
 from tvident._choices import TERM_NAMES
 from tvident._command_line.group import commands, main
 from tvident._command_line.method import METHOD
+from tvident._command_line.quantities import RATE
+
+
+def _only_standard_input(_: click.Context, __: click.Parameter, file: str) -> str:
+    """Refuse a file: what is recorded while it is taken comes through a pipe."""
+    if file != "-":
+        raise click.UsageError(
+            f"live takes what is piped in, as -; got {file!r}; write tvident live - < {file}, or identify a file that is whole: "
+            "tvident identify"
+        )
+    return file
 
 
 @main.command(
     epilog="Example: a-driver | tvident live - --angle position --torque effort --time t --sample-rate 1000 --method paper"
 )
-@click.argument("file", metavar="[-]", default="-", type=click.Choice(["-"]))
+@click.argument("file", metavar="[-]", default="-", callback=_only_standard_input)
 @click.option(
     "--lsl", metavar="NAME", help="Take a stream of the Lab Streaming Layer instead: its name, type=… or source_id=…."
 )
@@ -32,7 +43,7 @@ from tvident._command_line.method import METHOD
 @click.option(
     "--torque-unit", metavar="UNIT", help="Unit of the torque, as 'N mm'; by default its header's or label's, or N m."
 )
-@click.option("--sample-rate", type=float, help="Nominal samples per second; by default that of the LSL stream.")
+@click.option("--sample-rate", type=RATE, help="Nominal samples per second; by default that of the LSL stream.")
 @METHOD
 @click.option("--inertia", metavar="KIND", help="constant, windowed, or a known number.")
 @click.option("--damping", metavar="KIND", help="The same for damping; 0 leaves it out.")

@@ -10,6 +10,7 @@ import click
 
 from tvident._choices import Criterion
 from tvident._command_line.group import commands
+from tvident._command_line.quantities import PERIOD_IN_TIME_UNIT, RATE
 
 Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 
@@ -72,8 +73,8 @@ PERIOD = click.option(
 )
 
 TIME = options_of(
-    click.option("--sample-rate", type=float, help="Samples per second."),
-    click.option("--delta", type=float, help="Sample period in seconds."),
+    click.option("--sample-rate", type=RATE, help="Samples per second."),
+    click.option("--delta", type=PERIOD_IN_TIME_UNIT, help="Sample period in seconds."),
     click.option("--time", "time_channel", metavar="NAME", help="Channel that holds the time in seconds."),
 )
 

@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from tvident._command_line.group import commands, main
+from tvident._command_line.quantities import RATE
 
 
 @main.command(
@@ -29,7 +30,7 @@ from tvident._command_line.group import commands, main
     "--torque-unit", metavar="UNIT", help="Unit of --torque-noise and --torque-rms, as 'N mm', or N; N m by default."
 )
 @click.option("--resolution", type=float, help="Seconds over which a stiffness that changes may be averaged.")
-@click.option("--sample-rate", type=float, help="Samples per second; 1000 by default.")
+@click.option("--sample-rate", type=RATE, help="Samples per second; 1000 by default.")
 @click.option("--more", type=float, help="Seconds to be recorded in addition to FILE; 60 by default.")
 @click.option("--json", "as_json", is_flag=True, help="Print the plan as JSON, with its units.")
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="File for the torque, of a kind by its ending.")

@@ -8,12 +8,13 @@ import click
 
 from tvident._choices import Excitation, Pattern
 from tvident._command_line.group import commands, main
+from tvident._command_line.quantities import RATE
 
 
 @main.command()
 @click.argument("output", type=click.Path(dir_okay=False))
 @click.option("--duration", type=float, default=20.0, show_default=True, help="Seconds.")
-@click.option("--sample-rate", type=float, default=1000.0, show_default=True, help="Samples per second.")
+@click.option("--sample-rate", type=RATE, default=1000.0, show_default=True, help="Samples per second.")
 @click.option("--seed", type=int, default=0, show_default=True, help="The same seed gives the same recording.")
 @click.option(
     "--pattern", type=click.Choice(get_args(Pattern)), default="slider", show_default=True, help="How stiffness moves."

@@ -20,8 +20,14 @@ def parameter_of(value: str, channels: recordings.Channels, file: str | None) ->
     try:
         return float(value)
     except ValueError:
+        pass
+    try:
         full = full_name(channels, value, file or "the command line")
-        return Channel(channels[full], named_unit(full)[1])
+    except KeyError as error:
+        raise click.UsageError(
+            f"{error.args[0]}; or write one of {', '.join(get_args(Kind))}, or a number with a point, as 20.5"
+        ) from None
+    return Channel(channels[full], named_unit(full)[1])
 
 
 def terms_of(texts: tuple[str, ...]) -> list[Any] | None:

@@ -22,7 +22,10 @@ def factor_of(scale: str, channels: recordings.Channels, file: str | None) -> An
     try:
         factor = float(scale)
     except ValueError:
-        return recordings.channel(channels, scale, file or "the command line")
+        try:
+            return recordings.channel(channels, scale, file or "the command line")
+        except KeyError as error:
+            raise click.UsageError(f"{error.args[0]}; or write a number with a point, as 0.5") from None
     if not math.isfinite(factor):
         raise click.UsageError(f"a scale must be finite; got {scale}; give a number such as 0.001")
     return factor
