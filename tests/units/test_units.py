@@ -186,6 +186,9 @@ def test_words_are_no_units(text: str) -> None:
         ("elapsedMillis", ("elapsed", "ms")),
         ("timestamps", ("timestamps", "")),
         ("header.stamp.nanosec", ("header.stamp.nanosec", "")),
+        ("motor_current_A", ("motor_current", "A")),
+        ("Strom mA", ("Strom", "mA")),
+        ("joint_A", ("joint_A", "")),
         ("deg", ("deg", "deg")),
         ("ms", ("ms", "ms")),
         ("millis", ("millis", "ms")),
@@ -245,6 +248,12 @@ def test_an_accelerometer_measures_in_g() -> None:
         factor_of_derivative(ROTARY, "acceleration", "g")
     with pytest.raises(ValueError, match="converted to m/s; got 'g'"):
         factor_of_derivative(LINEAR, "velocity", "g")
+
+
+@pytest.mark.parametrize("text", ["A", "mA", "V"])
+def test_a_current_is_told_what_makes_a_torque_of_it(text: str) -> None:
+    with pytest.raises(ValueError, match="multiplied by the torque of one A or V"):
+        factor_to(ROTARY, "torque", text, name="the torque")
 
 
 def test_slices_keep_their_unit_and_what_is_computed_has_none() -> None:

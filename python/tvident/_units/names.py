@@ -44,6 +44,12 @@ _OF_TORQUES = re.compile(r"(.*(?:torque|moment|effort|tau).*?)[_\s]+(nmm?|mnm|kn
 _TORQUES = {"nm": "Nm", "nmm": "Nmm", "mnm": "mNm", "knm": "kNm"}
 
 
+_OF_CURRENTS = re.compile(
+    r"(.*(?i:current|strom|courant|corriente|corrente|voltage|spannung).*?)[_\s]+([mk]?[AV])", re.DOTALL
+)
+"""Units of one letter, which would be a second channel's elsewhere: A and B."""
+
+
 def named_unit(name: str) -> tuple[str, str]:
     """Return a channel's name without its unit, and the unit; an empty string if it has none.
 
@@ -80,7 +86,7 @@ def _without_brackets(name: str) -> tuple[str, str]:
     if found:
         unit = (found[2] or found[3]).lower()
         return found[1], _TIMES.get(unit, unit)
-    for pattern in (_BEHIND_A_LINE, _BEHIND_A_WORD):
+    for pattern in (_OF_CURRENTS, _BEHIND_A_LINE, _BEHIND_A_WORD):
         found = pattern.fullmatch(name)
         unit = found[2].replace("_", "-") if found else ""
         if found and unit_of(unit) is not None and unit_of(name) is None:

@@ -16,6 +16,7 @@ class UnitError(ValueError):
 
 _ANGLE, _LENGTH, _TIME = (0, 0, 0, 1, *NONE[4:]), (0, 1, *NONE[2:]), (0, 0, 1, *NONE[3:])
 _TORQUE, _FORCE = (1, 2, -2, *NONE[3:]), (1, 1, -2, *NONE[3:])
+_AMPERE, _VOLT = (*NONE[:5], 1, *NONE[6:]), (*NONE[:4], 1, *NONE[5:])
 _RADIAN = 3
 """Which of the powers of a dimension is that of rad."""
 
@@ -120,9 +121,13 @@ def factor_to(system: System, quantity: str, text: str | None, *, name: str) -> 
         raise UnitError(f"the unit of {name} must be one that is known; got {text!r}; {cure}")
     factor = _in(unit, system.dimensions[quantity])
     if not math.isfinite(factor):
-        raise UnitError(
-            f"{name} must be in a unit that can be converted to {wanted}; got {text!r}; {cure}; a factor of your own converts it too"
+        is_electrical = quantity == "torque" and unit.dimension in {_AMPERE, _VOLT}
+        more = (
+            "a current or a voltage must be multiplied by the torque of one A or V"
+            if is_electrical
+            else "a factor of your own converts it too"
         )
+        raise UnitError(f"{name} must be in a unit that can be converted to {wanted}; got {text!r}; {cure}; {more}")
     return factor
 
 
