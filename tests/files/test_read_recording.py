@@ -131,3 +131,22 @@ def test_channels_of_words_and_tables_have_a_sample_rate() -> None:
     channels = {"time": time, "label": np.array(["rest", "motion"] * 25), "note": np.array([None, 1.5] * 25)}
     assert tvident.FileRecording(channels).sample_rate == 1000
     assert tvident.FileRecording(pd.DataFrame(channels)).sample_rate == 1000
+
+
+def test_infinite_values_and_counts_without_a_sign_are_no_warning_and_no_times() -> None:
+    """The rate was looked for with differences: a raw warning of NumPy, and counts that go down wrapped."""
+    time = np.arange(100) / 250
+    wild = np.where(np.arange(100) // 2 == 10, np.inf, time)
+    down = np.arange(100, 0, -1).astype(np.uint32)
+    recording = tvident.FileRecording({"time [s]": time, "wild": wild, "down": down})
+    assert recording.sample_rate == pytest.approx(250)
+    assert "250 Hz" in repr(recording)
+
+
+def test_one_of_several_devices_is_asked_for(tmp_path: Path) -> None:
+    (tmp_path / "x.txt").write_text("A\t\tB\t\nt\tq\tt\tq\ns\t°\ts\t°\n0,1\t2,5\t0,1\t3,5\n0,2\t2,6\t0,2\t3,6\n")
+    recording = tvident.read_recording(tmp_path / "x.txt")
+    with pytest.raises(KeyError, match=r"A\.q \[°\], B\.q \[°\]; write one of these as it is here"):
+        recording["q"]
+    assert recording["B.q"][0] == 3.5
+    assert recording["B.q [°]"].unit == "°"
