@@ -65,6 +65,13 @@ def test_a_comment_may_be_about_values_that_are_missing(tmp_path: Path) -> None:
     """It was refused as a row in which words stand."""
     found = read(tmp_path, "#NV, not available\nt,x\n1,2\n#NV, a sensor fell off\n#NV,#NV\n3,4\n")
     np.testing.assert_equal(found, {"t": [1, np.nan, 3], "x": [2, np.nan, 4]})
+    # Rows are no comments, whatever separates their cells, and what may be a wrong number is refused.
+    for row in ("#NV 3", "#NV\t3", "#NV;3"):
+        separator = row[3]
+        assert len(read(tmp_path, f"t{separator}x\n1{separator}2\n{row}\n2{separator}3\n")["x"]) == 3
+    for wrong in ("#NV,bad", "#NV,0x10"):
+        with pytest.raises(recordings.FileError, match="line 3 must hold numbers"):
+            read(tmp_path, f"t,x\n1,2\n{wrong}\n2,3\n")
     with pytest.warns(recordings.FileWarning, match="'state': not read"):
         assert len(read(tmp_path, "t,x,state\n1,2,a\n2,3,b\n#NV,#NV,b\n3,4,c\n")["t"]) == 4
 

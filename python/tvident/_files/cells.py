@@ -43,7 +43,7 @@ _NOT_AVAILABLE = re.compile("#(?:n/[ad]|nv)", re.IGNORECASE)
 """What a sheet writes on purpose, for a value that is missing."""
 
 _NOT_A_COMMENT = re.compile(rf"{_ERROR}|#(?:qnan|snan|ind|inf)\b", re.IGNORECASE | re.MULTILINE)
-_BETWEEN_CELLS = re.compile(r"[,;\t|]")
+_BETWEEN_WORDS = re.compile(r"[,;|\s]+")
 _IN_QUOTES = re.compile(r'"[^"]*"|[^\s"]+')
 
 
@@ -76,14 +76,13 @@ def is_comment(line: str) -> bool:
     return line.lstrip().startswith("#") and not without_comment(line).strip()
 
 
-def is_remark(line: str) -> bool:
-    """Return whether a line begins as an error of a spreadsheet does, and goes on with words and no number: a comment about it."""
+def is_remark(line: str, *, least: int = 1) -> bool:
+    """Return whether a line begins as an error of a spreadsheet does, and goes on with so many words and no number: a comment about it."""
     if not line.lstrip().startswith("#"):
         return False
-    cells = [cell.strip() for cell in _BETWEEN_CELLS.split(line)]
-    return any(number(cell, comma=True) is None for cell in cells) and not any(
-        is_present(cell, comma=True) for cell in cells
-    )
+    words = [word for word in _BETWEEN_WORDS.split(line.strip()) if number(word, comma=True) is None]
+    are_numbers = any(is_present(word, comma=True) for word in _BETWEEN_WORDS.split(line.strip()))
+    return len(words) >= least and not are_numbers
 
 
 def hides_numbers(text: str) -> bool:

@@ -247,7 +247,7 @@ class Rows:
         rows = []
         for place, whole in enumerate(lines, self._line + 1):
             line = without_comment(whole)
-            if not line.strip() or (self._dialect.is_plain and is_remark(line)):
+            if not line.strip() or self._is_remark(line):
                 if self._width == 1 and place < self._line + len(lines) and not whole.lstrip().startswith("#"):
                     self._blank = place
                 continue
@@ -255,6 +255,12 @@ class Rows:
             if row is not None:
                 rows.append(row)
         return np.array(rows, dtype=np.float64).reshape(-1, self._width)
+
+    def _is_remark(self, line: str) -> bool:
+        """Return whether a line is a comment about what is missing; of as many cells as columns one word may be a wrong number."""
+        if not line.lstrip().startswith("#") or not self._dialect.is_plain:
+            return False
+        return is_remark(line, least=2 if len(split(line, self._dialect.separator)) == self._width else 1)
 
     def _row(self, place: int, line: str) -> list[float] | None:
         """Return the numbers of a line, or None where it holds words that may be the end of the table."""
