@@ -146,7 +146,7 @@ def test_infinite_values_and_counts_without_a_sign_are_no_warning_and_no_times()
 def test_one_of_several_devices_is_asked_for(tmp_path: Path) -> None:
     (tmp_path / "x.txt").write_text("A\t\tB\t\nt\tq\tt\tq\ns\t°\ts\t°\n0,1\t2,5\t0,1\t3,5\n0,2\t2,6\t0,2\t3,6\n")
     recording = tvident.read_recording(tmp_path / "x.txt")
-    with pytest.raises(KeyError, match=r"A\.q \[°\], B\.q \[°\]; write one of these as it is here"):
+    with pytest.raises(KeyError, match=r"A\.q \[°\], B\.q \[°\]; name one of these as it is written here"):
         recording["q"]
     assert recording["B.q"][0] == 3.5
     assert recording["B.q [°]"].unit == "°"

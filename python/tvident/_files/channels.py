@@ -162,7 +162,7 @@ def full_name(channels: Mapping[str, Any], name: str, source: str) -> str:
     same = same or inside
     if same:
         raise KeyError(
-            f"{place} must have one channel '{asked}'; it has {listed(same)}; write one of these as it is here"
+            f"{place} must have one channel '{asked}'; it has {listed(same)}; name one of these as it is written here"
         )
     if _NUMBER.fullmatch(name) and int(name) < len(channels):
         return list(channels)[int(name)]
