@@ -94,6 +94,16 @@ fn the_colour_of_noise_is_found_beside_a_signal() {
 }
 
 #[test]
+fn a_little_colour_is_found_in_short_records() {
+    let colour = |samples: &[f64]| coloured_noise(&samples, 1.0, Instructions::current());
+    for seed in 0..40 {
+        // By chance the four shortest windows may each agree with white noise.
+        assert!(!colour(&first_order(0.5, 100 + seed, |_| 0.0)[..2000]).is_white(), "seed {seed}");
+        assert!(colour(&normal(200 + seed, 2000)).is_white(), "seed {seed}");
+    }
+}
+
+#[test]
 fn what_is_white_or_no_noise_has_no_colour() {
     let colour = |samples: &[f64]| coloured_noise(&samples, 1.0, Instructions::current());
     let white: Vec<f64> = wave(20_000).zip(normal(11, 20_000)).map(|(wave, e)| 30.0 * wave + e).collect();
