@@ -12,6 +12,7 @@ import numpy.typing as npt
 from tvident import _core
 from tvident._derivatives.found import CHOSEN, Found, together
 from tvident._derivatives.incomplete import Incomplete, filled, left_out
+from tvident._derivatives.plans import sliding_window
 from tvident._status import Status
 
 Numbers = npt.NDArray[np.float64]
@@ -65,12 +66,12 @@ def _of_record(
     for _ in range(_ROUNDS):
         bridged = _bridged(record, plan_of(length, derivative=0), left_out(length, longest_gap), workers)
         found = choose(bridged)
-        longer = int(np.ravel(found.window_length)[0])
+        longer = sliding_window(int(np.ravel(found.window_length)[0]), record.size)
         if longer <= length:
             break
         length = longer
     errors = np.array(found.errors())
-    lengths = np.asarray(found.window_length).tolist()
+    lengths = [sliding_window(length, record.size) for length in np.asarray(found.window_length).tolist()]
     for derivative, (own, order) in enumerate(zip(lengths, found.settings["order"], strict=True)):
         plan = plan_of(own, highest=order, derivative=derivative)
         beside = filled(

@@ -14,7 +14,7 @@ from tvident import _arguments as arguments
 from tvident import _core
 from tvident._clocks import grid_of
 from tvident._derivatives.found import Found
-from tvident._derivatives.plans import SHORTEST_WINDOW
+from tvident._derivatives.plans import SHORTEST_WINDOW, sliding_window
 from tvident._status import Status
 
 Numbers = npt.NDArray[np.float64]
@@ -153,7 +153,9 @@ def choose_at_own_times(
     apart = _apart(grid.places)
     onto = _core.Resampling(grid.places[apart], grid.samples, order=_ORDER, bridged=grid.bridged)
     chosen = choose_on(onto.onto_grid(np.ascontiguousarray(samples[..., apart]), workers=workers), delta=grid.period)
-    lengths = np.asarray(chosen.window_length)
+    lengths = np.array(chosen.window_length)
+    for at, length in np.ndenumerate(lengths):
+        lengths[at] = sliding_window(int(length), grid.samples)
     orders = np.array(chosen.settings["order"]).reshape(lengths.shape)
 
     def windows(derivative: int, index: tuple[int, ...]) -> _TimedWindows:
@@ -172,6 +174,8 @@ def choose_at_own_times(
                 report(times.size * (done + 1) // max(1, lengths.size), times.size)
     return replace(
         chosen,
+        window_length=lengths,
+        settings=chosen.settings | {"window_length": lengths.tolist()},
         derivatives=found.value[..., ::step],
         order=found.order[-1, ..., ::step],
         status=np.bitwise_or.reduce(found.status[..., ::step]),

@@ -16,6 +16,9 @@ HIGHEST_ORDER = 15
 SHORTEST_WINDOW = 5
 """Samples; fewer leave no choice of order."""
 
+_LONGEST_SLIDING = 20_001
+"""Samples of a window that slides, where the chosen one is all of a record."""
+
 
 # All that tables depend on: the key of the cache.
 @lru_cache(maxsize=8)
@@ -62,6 +65,14 @@ def plan(
         quantisation,
         _core.instructions(),
     )
+
+
+def sliding_window(length: int, samples: int) -> int:
+    """Return the length of windows that slide along a record: half of it where the chosen one is all of it.
+
+    At the ends of a window lower orders may be taken, to which a derivative is zero with no error; at most half of a record is such an end.
+    """
+    return length if length <= samples // 2 else min(_LONGEST_SLIDING, (samples // 2 - 1) // 2 * 2 + 1)
 
 
 def quantisation_step(samples: npt.NDArray[Any], given: float | None) -> float:

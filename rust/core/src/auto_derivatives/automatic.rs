@@ -1,7 +1,7 @@
 //! Window length and order chosen together: for a record as a whole, then locally.
 //!
 //! For each derivative of each record `global_choice` finds the window and the order of least mean squared error.
-//! A record that is a parabola and noise has no such window: `trend` finds out. Around them `candidate_weights` weighs candidates sample by sample, and `local_average` averages them. Within half a
+//! A record that is a parabola and noise has no such window: `trend` finds out, and `whole_record` estimates from all of it. Around them `candidate_weights` weighs candidates sample by sample, and `local_average` averages them. Within half a
 //! window of the ends, `boundary` estimates with shrunk coefficients. Each derivative of a record has its own windows,
 //! since the best ones differ.
 
@@ -12,8 +12,9 @@ use crate::auto_derivatives::candidate_weights::Refinement;
 use crate::auto_derivatives::candidates::Target;
 use crate::auto_derivatives::global_choice::{Pair, SHORTEST, rounded};
 use crate::auto_derivatives::local_weights::DerivativeOutputs;
-use crate::auto_derivatives::survey::{CLOSELY, Survey};
-use crate::auto_derivatives::trend::trend;
+use crate::auto_derivatives::survey::{self, CLOSELY, Survey};
+use crate::auto_derivatives::trend::ParabolicTrend;
+use crate::auto_derivatives::whole_record::{LONGEST, WholeTarget};
 use crate::error::Error;
 use crate::exec::memory;
 use crate::exec::pool::Watch;
@@ -48,8 +49,8 @@ pub struct AutomaticRecord<'a> {
     noise: CorrelatedNoise,
     /// Half-width of the shortest window.
     shortest: usize,
-    /// The degree of the parabola that is all there is.
-    trend: Option<usize>,
+    /// The parabola that is all there is.
+    trend: Option<ParabolicTrend>,
     instructions: Instructions,
 }
 
@@ -74,8 +75,8 @@ impl<'a> AutomaticRecord<'a> {
             }
             None => (SHORTEST, noise.clone()),
         };
-        let trend = trend(record, &noise, instructions)?;
         let survey = Survey::new(record, highest.min(HIGHEST_ORDER), instructions)?;
+        let trend = ParabolicTrend::new(survey.means(), &noise, instructions)?;
         Ok(Self { survey, noise, shortest, trend, instructions })
     }
 }
@@ -85,7 +86,7 @@ impl std::fmt::Debug for AutomaticRecord<'_> {
         formatter
             .debug_struct("AutomaticRecord")
             .field("noise", &self.noise)
-            .field("trend", &self.trend)
+            .field("trend", &self.trend.as_ref().map(|trend| trend.degree))
             .finish_non_exhaustive()
     }
 }
@@ -111,6 +112,9 @@ pub struct AutomaticChoice {
     /// Order of the polynomial.
     pub order: usize,
 }
+
+/// Of a record that is a trend, a part of one over this on either side is near an end: in its middle errors are smaller.
+const NEAR_END: usize = 4;
 
 /// Numbers that are kept of a sample at most, beside the estimates.
 const NUMBERS: usize = 4;
@@ -159,14 +163,19 @@ pub fn estimate_automatically(
     let (shortest, instructions, of_means) = (*shortest, *instructions, samples > CLOSELY);
     let target = Target { derivative, highest, fixed, shortest, of_means, delta, noise, instructions };
     let total = 2 * samples;
-    let trend = trend.and_then(|degree| Some((longest_window(&target, degree, samples)?, degree)));
-    let (best, target, at_ends) = match trend {
-        Some((pair, degree)) => {
-            let only = Target { highest: pair.order, fixed: true, ..target };
-            (Some(pair), only, Target { highest: pair.order.max(degree), ..target })
-        }
-        None => (survey.best(&target, &mut || check_cancelled(watch, 0, total))?, target, target),
+    let trend = trend.as_ref().filter(|trend| highest >= trend.degree);
+    // Of longer records there are many windows of any length: they must have found none too long, either.
+    let best = match trend {
+        Some(_) if samples <= LONGEST => None,
+        _ => survey.best(&target, &mut || check_cancelled(watch, 0, total))?,
     };
+    let none_too_long = samples <= LONGEST || best.is_some_and(|pair| pair.half >= survey::LONGEST / 2);
+    if let Some(trend) = trend.filter(|_| none_too_long) {
+        check_cancelled(watch, samples, total)?;
+        let choice = of_trend(trend, &target, estimates);
+        check_cancelled(watch, total, total)?;
+        return Ok(Some(choice));
+    }
     let planned = best.map(|pair| Ok((pair, Refinement::new(samples, pair, &target)?))).transpose()?;
     let Some((pair, Some(refinement))) = planned else {
         estimates.values.fill(f64::NAN);
@@ -178,14 +187,9 @@ pub fn estimate_automatically(
     };
     let mut outputs = DerivativeOutputs { values: estimates.values, errors: estimates.errors, order: estimates.order };
     refinement.estimate(survey.means(), &mut outputs, workers, watch)?;
-    let both = boundary::estimate(survey, pair, &at_ends, &mut || check_cancelled(watch, total, total))?;
-    let least = match trend {
-        Some(_) => boundary::errors_of_trend(survey, pair.half, &at_ends)?,
-        None => vec![0.0; pair.half],
-    };
+    let both = boundary::estimate(survey, pair, &target, &mut || check_cancelled(watch, total, total))?;
     for (end, at_end) in both {
         for (place, (&value, &error)) in at_end.values.iter().zip(&at_end.errors).enumerate() {
-            let error = error.max(least.get(place).copied().unwrap_or(0.0));
             let sample = if end == End::First { place } else { samples - 1 - place };
             // Places that the windows at the end do not reach may still be reached by shorter ones inside.
             if !value.is_nan() {
@@ -195,25 +199,36 @@ pub fn estimate_automatically(
             }
         }
     }
+    flag(estimates, pair.half);
+    let Pair { half, order } = pair;
+    Ok(Some(AutomaticChoice { window_length: 2 * half + 1, order }))
+}
+
+/// Estimates from all of a record that is a trend.
+fn of_trend(trend: &ParabolicTrend, target: &Target<'_>, estimates: &mut AutomaticEstimates<'_>) -> AutomaticChoice {
+    let &Target { derivative, highest, fixed, delta, instructions, .. } = target;
+    let covariances = &trend.covariances;
+    let target = WholeTarget { derivative, highest, fixed, delta, covariances, instructions };
+    let samples = estimates.values.len();
+    let AutomaticEstimates { values, errors, order, .. } = estimates;
+    let order = trend.whole.estimate(&target, &mut DerivativeOutputs { values, errors, order });
+    flag(estimates, samples / NEAR_END);
+    AutomaticChoice { window_length: samples - (samples + 1) % 2, order }
+}
+
+/// Sets the status of all samples, of which some are near an end.
+fn flag(estimates: &mut AutomaticEstimates<'_>, near_end: usize) {
     let (good, invalid) = (Status::GOOD.bits(), Status::INVALID.bits());
     for (status, value) in estimates.status.iter_mut().zip(&*estimates.values) {
         *status = if value.is_nan() { invalid } else { good };
     }
-    for end in [0..pair.half, samples - pair.half..samples] {
+    let samples = estimates.status.len();
+    for end in [0..near_end, samples.saturating_sub(near_end)..samples] {
         let of_end = estimates.status.get_mut(end).unwrap_or_default();
         for status in of_end {
             *status |= Status::EDGE.bits();
         }
     }
-    let Pair { half, order } = pair;
-    Ok(Some(AutomaticChoice { window_length: 2 * half + 1, order }))
-}
-
-/// The longest window, and the lowest order in it that follows a trend of some degree. The next higher one is the same at the centre.
-fn longest_window(target: &Target<'_>, degree: usize, samples: usize) -> Option<Pair> {
-    let half = (samples / 2 - 1) / 2;
-    let order = target.orders(half).into_iter().find(|order| order + 1 >= degree)?;
-    Some(Pair { half, order })
 }
 
 /// The step of a quantised signal that the noise does not hide, and how many samples it needs to move by one where it does not rest.

@@ -133,6 +133,11 @@ impl<'a> BlockMeans<'a> {
         self.record
     }
 
+    /// Samples of the longest means of at most so many.
+    pub(crate) fn coarsest(&self, most: usize) -> usize {
+        self.levels.iter().map(|level| level.grid.step).filter(|&step| step <= most).max().unwrap_or(1)
+    }
+
     /// The means of so many samples; those of one are the record.
     pub(crate) fn of(&self, step: usize) -> &dyn Samples {
         if let Some(level) = self.levels.iter().find(|level| level.grid.step == step) {

@@ -114,25 +114,6 @@ pub(crate) fn estimate(
     ends.into_iter().map(at_end).collect()
 }
 
-/// Standard errors of the polynomial of a window at the first half of it: what a record that is a trend knows of its derivatives near the ends.
-/// Coefficients that are shrunk to nothing may be as large as their errors.
-///
-/// # Errors
-/// If there is not the memory.
-pub(crate) fn errors_of_trend(survey: &Survey<'_>, half: usize, target: &Target<'_>) -> Result<Vec<f64>, Error> {
-    let tables = survey.tables(half)?;
-    let order = target.highest(half);
-    let correlations = correlations(&tables.basis, order, 1, target.noise);
-    let slopes = SampleSlopes::new(&tables.basis, 1, target.derivative, order + 1);
-    let places = knots(half);
-    let error = |of_coefficients: &[f64; MOST_DEGREES]| {
-        let weights: Vec<f64> = of_coefficients[..=order].iter().map(|q| target.scale() * q).collect();
-        (target.noise.variance() * quadratic(&weights, &correlations)).sqrt()
-    };
-    let errors: Vec<f64> = slopes.of_coefficients_at(&places, target.instructions).iter().map(error).collect();
-    Ok(interpolated(&places, &errors))
-}
-
 /// Averages the estimates of windows of several lengths.
 fn average(found: &[Shrunk], count: usize) -> AtEnd {
     let mut at_end = AtEnd { values: vec![f64::NAN; count], errors: vec![f64::NAN; count], order: 0 };

@@ -18,6 +18,7 @@ pub(crate) mod slopes;
 pub(crate) mod survey;
 pub(crate) mod symmetric_grid;
 pub(crate) mod trend;
+pub(crate) mod whole_record;
 
 pub use automatic::{
     AutomaticChoice, AutomaticEstimates, AutomaticOptions, AutomaticRecord, FEWEST_SAMPLES, estimate_automatically,

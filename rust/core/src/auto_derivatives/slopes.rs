@@ -13,6 +13,8 @@ pub(crate) struct SampleSlopes<'a> {
     basis: &'a Basis,
     step: usize,
     derivative: usize,
+    /// Samples before the window that places are counted from.
+    before: usize,
     /// The polynomials whose means those of the basis are, in terms of the basis; none where they are the same.
     polynomials: Vec<Vec<f64>>,
 }
@@ -20,7 +22,12 @@ pub(crate) struct SampleSlopes<'a> {
 impl<'a> SampleSlopes<'a> {
     pub(crate) fn new(basis: &'a Basis, step: usize, derivative: usize, degrees: usize) -> Self {
         let polynomials = if step == 1 { Vec::new() } else { AtCentre::new(basis, step).polynomials(degrees) };
-        Self { basis, step, derivative, polynomials }
+        Self { basis, step, derivative, before: 0, polynomials }
+    }
+
+    /// The same with places counted from so many samples before a window of means.
+    pub(crate) fn after(self, before: usize) -> Self {
+        Self { before, ..self }
     }
 
     /// The products of some factors with the derivative of every polynomial of the basis, summed, at the first samples of the window: at
@@ -45,8 +52,8 @@ impl<'a> SampleSlopes<'a> {
 
     /// Where a sample lies from the centre, in means.
     fn between(&self, place: usize) -> f64 {
-        let centre = self.basis.length() * self.step / 2;
-        (place as f64 - centre as f64) / self.step as f64
+        let centre = self.before as f64 + (self.basis.length() * self.step - 1) as f64 / 2.0;
+        (place as f64 - centre) / self.step as f64
     }
 
     /// The derivative of what every coefficient belongs to, from those of the basis.

@@ -8,95 +8,168 @@
 //! ```text
 //! mean of c_j² / q_jᵀΓq_j = 1 ± √(2/ν).
 //! ```
+//!
+//! In long records a mean over all windows would not see what happens in one of them: there no window by itself may exceed chance.
 
+use crate::auto_derivatives::block_means::BlockMeans;
+use crate::auto_derivatives::whole_record::{DEGREES, LONGEST, WholeRecord, WindowCoefficients};
 use crate::error::Error;
-use crate::exec::memory;
 use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::tables::basis;
 use crate::noise::correlated::CorrelatedNoise;
-use crate::record::samples::{Samples, is_usable};
+use crate::record::samples::Samples;
 use crate::simd::f64x8::{Packet, WIDTH};
 use crate::simd::instructions::Instructions;
 use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
-/// Degrees of a trend, and those that are tested.
+/// Degrees of a trend.
 const TRENDS: usize = 3;
-const DEGREES: usize = 16;
 
 /// Windows are so much shorter from one test to the next, to these last.
 const SHORTER: usize = 8;
 const SHORTEST: usize = DEGREES + 1;
 
+/// Windows of long records are made of means, at least so many.
+const LEAST_MEANS: usize = 512;
+
+/// Samples that are read at a time, at least.
+const TOGETHER: usize = 1 << 14;
+
 /// Degrees that are tested together: a band of frequencies. Where a motion adds less to a band than its noise, no polynomial gains by following it.
 const GROUP: usize = 4;
-
-/// Of longer records windows are chosen: there are many of any length.
-const LONGEST: usize = 1 << 16;
 
 /// What is left may exceed the noise by so many standard deviations, and white noise and coloured noise at low frequencies are known to so much.
 const CHANCE: f64 = 3.5;
 const WHITE: f64 = 0.05;
 const COLOURED: f64 = 0.25;
 
-/// The degree of the trend that is all there is, 0 to 2, or `None`.
-///
-/// # Errors
-/// If there is not the memory.
-pub(crate) fn trend(
-    record: &dyn Samples,
-    noise: &CorrelatedNoise,
-    instructions: Instructions,
-) -> Result<Option<usize>, Error> {
-    let samples = record.len();
-    if samples > LONGEST || noise.variance().is_nan() || noise.variance() <= 0.0 {
-        return Ok(None);
-    }
-    memory::ask_for_numbers(samples)?;
-    let mut values = vec![0.0; samples];
-    record.read(0, &mut values);
-    if !values.iter().all(|&value| is_usable(value)) {
-        return Ok(None);
-    }
-    let known = if noise.is_white() { WHITE } else { COLOURED };
-    let mut degree = 0;
-    let halving = std::iter::successors(Some(samples), |length| Some(length / SHORTER));
-    // The shortest windows see the highest frequencies.
-    for length in halving.take_while(|&length| length > 2 * SHORTEST).chain([SHORTEST]) {
-        let power = powers(&values, length, noise, instructions)?;
-        let count = (samples / length) as f64;
-        let noise_alone = |group: &[f64]| {
-            let freedom = count * group.len() as f64;
-            let excess = group.iter().sum::<f64>() / group.len() as f64 - 1.0;
-            excess <= CHANCE * (2.0 / freedom + known * known).sqrt()
-        };
-        let found = (degree..TRENDS).find(|&degree| power[degree + 1..].chunks(GROUP).all(noise_alone));
-        let Some(found) = found else { return Ok(None) };
-        degree = found;
-    }
-    Ok(Some(degree))
+/// The logarithm of how rarely one window of many exceeds the noise by chance.
+const RARELY: f64 = 7.0;
+
+/// A polynomial of low degree that is all there is but noise.
+pub(crate) struct ParabolicTrend {
+    /// Its degree, 0 to 2.
+    pub(crate) degree: usize,
+    pub(crate) whole: WholeRecord,
+    /// Covariances of the coefficients.
+    pub(crate) covariances: Vec<[f64; DEGREES]>,
 }
 
-/// By degree, the mean square of the coefficients of windows side by side, over that of the noise.
-fn powers(
-    values: &[f64],
-    length: usize,
-    noise: &CorrelatedNoise,
-    instructions: Instructions,
-) -> Result<Vec<f64>, Error> {
-    let basis = basis(length, DEGREES)?;
-    let (total, count) = (noise.variance(), (values.len() / length) as f64);
-    let squares = dispatch(instructions, CoefficientSquares { values, basis: &basis });
-    let norms = dispatch(instructions, BasisNorms(&basis));
-    let power = |(degree, square): (usize, f64)| {
-        let expected = if noise.is_white() {
-            norms[degree]
-        } else {
-            let row: Vec<f64> = (0..length).map(|index| basis.value(degree, index)).collect();
-            row.iter().zip(noise.correlate(&row)).map(|(a, b)| a * b).sum()
+impl ParabolicTrend {
+    /// The trend that is all there is, or `None`.
+    ///
+    /// # Errors
+    /// If there is not the memory.
+    pub(crate) fn new(
+        means: &BlockMeans<'_>,
+        noise: &CorrelatedNoise,
+        instructions: Instructions,
+    ) -> Result<Option<Self>, Error> {
+        let samples = means.record().len();
+        if samples <= 2 * SHORTEST || noise.variance().is_nan() || noise.variance() <= 0.0 {
+            return Ok(None);
+        }
+        let whole = WholeRecord::new(means, instructions)?;
+        // No noise is denser than at the lowest frequencies: most motions need no more.
+        let densest = noise.density(0.0) / whole.step as f64;
+        let test = NoiseAlone::new(noise, 1.0);
+        if test.degree_from(0, &whole.coefficients.map(|c| c * c / densest)).is_none() {
+            return Ok(None);
+        }
+        let covariances = whole.covariances(noise);
+        let power = std::array::from_fn(|degree| whole.coefficients[degree].powi(2) / covariances[degree][degree]);
+        let Some(mut degree) = test.degree_from(0, &power) else { return Ok(None) };
+        let shorter = std::iter::successors(Some(samples / SHORTER), |length| Some(length / SHORTER));
+        // The shortest windows see the highest frequencies.
+        for length in shorter.take_while(|&length| length > 2 * SHORTEST).chain([SHORTEST]) {
+            let step = if samples > LONGEST { means.coarsest(length / LEAST_MEANS) } else { 1 };
+            let windows = TestedWindows::new(means.of(step), length / step, step, noise, instructions)?;
+            let test = NoiseAlone::new(noise, windows.count);
+            let Some(found) = test.degree_from(degree, &windows.power) else { return Ok(None) };
+            if samples > LONGEST && windows.largest > test.largest() {
+                return Ok(None);
+            }
+            degree = found;
+        }
+        Ok(Some(Self { degree, whole, covariances }))
+    }
+}
+
+/// What noise alone leaves in so many windows.
+struct NoiseAlone {
+    count: f64,
+    known: f64,
+}
+
+impl NoiseAlone {
+    fn new(noise: &CorrelatedNoise, count: f64) -> Self {
+        Self { count, known: if noise.is_white() { WHITE } else { COLOURED } }
+    }
+
+    /// The lowest degree, of some or a higher one, above which there is noise alone, by the power of every degree over that of the noise.
+    fn degree_from(&self, degree: usize, power: &[f64; DEGREES]) -> Option<usize> {
+        let noise_alone = |group: &[f64]| {
+            let freedom = self.count * group.len() as f64;
+            let excess = group.iter().sum::<f64>() / group.len() as f64 - 1.0;
+            excess <= CHANCE * (2.0 / freedom + self.known * self.known).sqrt()
         };
-        square / count / (expected * total)
-    };
-    Ok(squares.into_iter().enumerate().map(power).collect())
+        (degree..TRENDS).find(|&degree| power[degree + 1..].chunks(GROUP).all(noise_alone))
+    }
+
+    /// The largest sum of squares above a parabola in any of the windows: `k + 2√(kx) + 2x` is exceeded with a probability below `exp(-x)`
+    /// (Laurent and Massart 2000).
+    fn largest(&self) -> f64 {
+        let (freedom, x) = ((DEGREES - TRENDS) as f64, self.count.ln() + RARELY);
+        (1.0 + self.known) * (freedom + 2.0 * (freedom * x).sqrt() + 2.0 * x)
+    }
+}
+
+/// The coefficients of windows side by side, over those of the noise.
+struct TestedWindows {
+    count: f64,
+    /// By degree, their mean square.
+    power: [f64; DEGREES],
+    /// Of one window, the largest sum of squares above a parabola.
+    largest: f64,
+}
+
+impl TestedWindows {
+    /// Looks at windows of so many means of so many samples.
+    fn new(
+        record: &dyn Samples,
+        length: usize,
+        step: usize,
+        noise: &CorrelatedNoise,
+        instructions: Instructions,
+    ) -> Result<Self, Error> {
+        let basis = basis(length, DEGREES)?;
+        let norms = dispatch(instructions, BasisNorms(&basis));
+        let share = noise.variance() / step as f64;
+        let expected: [f64; DEGREES] = std::array::from_fn(|degree| {
+            if noise.is_white() {
+                return share * norms[degree];
+            }
+            let row = (0..length).flat_map(|index| std::iter::repeat_n(basis.value(degree, index), step));
+            let row: Vec<f64> = row.collect();
+            let product = row.iter().zip(noise.correlate(&row)).map(|(a, b)| a * b).sum::<f64>();
+            share * product / step as f64
+        });
+        let count = record.len() / length;
+        let together = (TOGETHER / length).max(1);
+        let mut samples = vec![0.0; length * together.min(count)];
+        let (mut squares, mut largest) = ([0.0; DEGREES], 0.0_f64);
+        for first in (0..count).step_by(together) {
+            let samples = &mut samples[..length * together.min(count - first)];
+            record.read(first * length, samples);
+            let part = dispatch(instructions, CoefficientSquares { samples, basis: &basis, expected: &expected });
+            squares.iter_mut().zip(part.squares).for_each(|(square, part)| *square += part);
+            // What is no number shows in the squares.
+            largest = largest.max(part.largest);
+        }
+        let count = count as f64;
+        let power = std::array::from_fn(|degree| squares[degree] / count / expected[degree]);
+        Ok(Self { count, power, largest })
+    }
 }
 
 /// By degree, the sum of the squares of a basis: one but for rounding.
@@ -117,40 +190,44 @@ impl Kernel for BasisNorms<'_> {
     }
 }
 
-/// By degree, the sum of the squared coefficients of windows side by side.
+/// The squared coefficients of windows side by side.
 struct CoefficientSquares<'a> {
-    values: &'a [f64],
+    samples: &'a [f64],
     basis: &'a Basis,
+    /// By degree, those of the noise.
+    expected: &'a [f64; DEGREES],
+}
+
+/// By degree their sum, and the largest sum over the degrees above a parabola in one window, over those of the noise.
+struct SquareSums {
+    squares: [f64; DEGREES],
+    largest: f64,
 }
 
 impl Kernel for CoefficientSquares<'_> {
-    type Output = [f64; DEGREES];
+    type Output = SquareSums;
 
     #[inline(always)]
-    fn run<S: Lanes>(self, _: S) -> [f64; DEGREES] {
-        let length = self.basis.length();
+    fn run<S: Lanes>(self, _: S) -> SquareSums {
         let mut squares = [Packet::ZERO; DEGREES / WIDTH];
-        for window in self.values.chunks_exact(length) {
-            let mut sums = [Packet::ZERO; DEGREES / WIDTH];
-            for (index, value) in window.iter().enumerate() {
-                // The reference keeps the digits of a small motion on a large offset.
-                let value = value - window[length / 2];
-                let (row, mirrored) = self.basis.row(index);
-                let odd = if mirrored { -value } else { value };
-                let values = Packet([value, odd, value, odd, value, odd, value, odd]);
-                for (sum, row) in sums.iter_mut().zip(row.chunks_exact(WIDTH)) {
-                    *sum += values * Packet::load(row);
-                }
+        let mut inverses = self.expected.map(f64::recip);
+        inverses[..TRENDS].fill(0.0);
+        let mut largest = 0.0_f64;
+        for window in self.samples.chunks_exact(self.basis.length()) {
+            let sums = WindowCoefficients { window, basis: self.basis }.sums();
+            let mut weighted = Packet::ZERO;
+            for ((square, sum), inverses) in squares.iter_mut().zip(sums).zip(inverses.chunks_exact(WIDTH)) {
+                let own = sum * sum;
+                *square += own;
+                weighted += own * Packet::load(inverses);
             }
-            for (square, sum) in squares.iter_mut().zip(sums) {
-                *square += sum * sum;
-            }
+            largest = largest.max(weighted.0.iter().sum());
         }
         let mut all = [0.0; DEGREES];
         for (all, square) in all.chunks_mut(WIDTH).zip(squares) {
             all.copy_from_slice(&square.0);
         }
-        all
+        SquareSums { squares: all, largest }
     }
 }
 
@@ -164,9 +241,16 @@ mod tests {
         uniform(4000).into_iter().map(|value| value * 12.0_f64.sqrt()).collect()
     }
 
+    /// The degree of the trend that is found.
+    fn degree_of(samples: &[f64], variance: f64) -> Option<usize> {
+        let means = BlockMeans::new(&samples, samples.len() / 4).expect("little memory");
+        let found = ParabolicTrend::new(&means, &CorrelatedNoise::white(variance), Instructions::current());
+        found.expect("little memory").map(|trend| trend.degree)
+    }
+
     fn found(signal: impl Fn(f64) -> f64) -> Option<usize> {
         let samples: Vec<f64> = noise().iter().enumerate().map(|(i, e)| e + signal(i as f64 / 4000.0)).collect();
-        trend(&samples.as_slice(), &CorrelatedNoise::white(1.0), Instructions::current()).expect("little memory")
+        degree_of(&samples, 1.0)
     }
 
     #[test]
@@ -187,11 +271,28 @@ mod tests {
     #[test]
     fn missing_samples_and_no_noise_are_no_trend() {
         let mut samples = noise();
-        let found = |samples: &[f64], variance: f64| {
-            trend(&samples, &CorrelatedNoise::white(variance), Instructions::current())
-        };
-        assert_eq!(found(&samples, 0.0), Ok(None));
+        assert_eq!(degree_of(&samples, 1.0), Some(0));
+        assert_eq!(degree_of(&samples, 0.0), None);
         samples[100] = f64::NAN;
-        assert_eq!(found(&samples, 1.0), Ok(None));
+        assert_eq!(degree_of(&samples, 1.0), None);
+    }
+
+    #[test]
+    fn what_happens_anywhere_in_a_long_record_is_no_trend() {
+        let samples = 200_000;
+        let noise: Vec<f64> = uniform(samples).into_iter().map(|value| value * 12.0_f64.sqrt()).collect();
+        let found = |signal: &dyn Fn(f64) -> f64| {
+            let samples: Vec<f64> = noise.iter().enumerate().map(|(i, e)| e + signal(i as f64)).collect();
+            degree_of(&samples, 1.0)
+        };
+        assert_eq!(found(&|_| 1e6), Some(0));
+        assert_eq!(found(&|i| 1e-5 * i), Some(1));
+        assert_eq!(found(&|i| 1e-9 * i * i), Some(2));
+        assert_eq!(found(&|i| 1e-5 * (i - 120_000.0).max(0.0)), None, "a bend");
+        assert_eq!(found(&|i| 0.1 * (i * std::f64::consts::TAU / 200_000.0).sin()), None, "one slow cycle");
+        for long in [20.0, 300.0, 4000.0] {
+            let bump = |i: f64| 20.0 / f64::sqrt(long) * (-((i - 77_777.0) / long).powi(2)).exp();
+            assert_eq!(found(&bump), None, "a bump of {long} samples");
+        }
     }
 }
