@@ -147,9 +147,10 @@ def _size(one: FoundExpansion, observations: float) -> str:
     criterion = one.sizes["criterion"]
     lowest = float(np.min(criterion))
     others = int(np.sum(criterion <= lowest + _EQUIVALENT)) - 1
+    averaged = "; the curve is the mean over sizes, each with its weight" if one.is_of_time and others else ""
     return (
         f"{what}: of {criterion.size} sizes the smallest whose criterion (AICc, {observations:.0f} independent equations) is within "
-        f"{_EQUIVALENT:g} of the lowest; {others} larger ones are as good"
+        f"{_EQUIVALENT:g} of the lowest; {others} larger ones are as good{averaged}"
     )
 
 

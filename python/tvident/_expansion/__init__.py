@@ -3,7 +3,7 @@
 from tvident._expansion.basis import Basis, Coordinate
 from tvident._expansion.expansion import Expansion
 from tvident._expansion.fit import Curves, Fitted, Linearised
-from tvident._expansion.rivals import Rival, scatter
+from tvident._expansion.rivals import Rivals
 from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown, placed
 from tvident._expansion.search import (
     DERIVATIVES,
@@ -12,8 +12,8 @@ from tvident._expansion.search import (
     SizeSearch,
     Tried,
     along_record,
+    curve_along,
     curves_of,
-    errors_along,
 )
 
 __all__ = [
@@ -28,12 +28,11 @@ __all__ = [
     "Fitted",
     "Linearised",
     "RecordPart",
-    "Rival",
+    "Rivals",
     "SizeSearch",
     "Tried",
     "along_record",
+    "curve_along",
     "curves_of",
-    "errors_along",
     "placed",
-    "scatter",
 ]

@@ -43,7 +43,8 @@ class Expansion:
         belongs to the two channels of `of`.
     size : "auto", int, or a pair of them
         How many functions. ``"auto"``: that with the lowest corrected Akaike criterion, in which overlapping equations count as
-        often as they tell something new; ``result.expansions["stiffness"].sizes`` is the table of all that were tried.
+        often as they tell something new; ``result.expansions["stiffness"].sizes`` is the table of all that were tried. A curve of time
+        is the mean over those that explain the record nearly as well.
     of : array_like, shape (n,), or a pair of them, optional
         The recorded channel that the parameter is a function of, such as a position; by default time. Of two channels: all products of
         the functions of each. Its noise counts as part of the curve. Equations that touch a missing value are left out.

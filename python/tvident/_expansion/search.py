@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TypeAlias
 
@@ -14,7 +14,7 @@ import numpy.typing as npt
 from tvident._expansion.basis import AT_A_TIME, Basis, Coordinate
 from tvident._expansion.families import Family
 from tvident._expansion.fit import Curves, Fitted, Linearised, ScoredSize
-from tvident._expansion.rivals import Rival, scatter
+from tvident._expansion.rivals import Rival, Rivals, weights_of
 from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown, placed
 from tvident._expansion.unseen import Bend, Unseen
 
@@ -89,12 +89,15 @@ class Tried:
     residual : float
         The sum of squares of whitened residuals over the number of independent equations: 1 where noise explains them.
     parameters : int
+    weight : float
+        How much it counts among all.
     """
 
     sizes: Mapping[str, tuple[int, ...]]
     criterion: float
     residual: float
     parameters: int
+    weight: float = 0.0
 
 
 @dataclass
@@ -116,7 +119,7 @@ class SizeSearch:
     noise: tuple[float, float]
     known: Curves
     tried: dict[tuple[int, ...], Tried] = field(default_factory=dict)
-    rivals: dict[str, list[Rival]] = field(default_factory=dict)
+    rivals: dict[str, Rivals] = field(default_factory=dict)
     _scores: dict[tuple[int, ...], tuple[list[ExpandedUnknown], ScoredSize]] = field(default_factory=dict)
     _bends: dict[str, Bend] = field(default_factory=dict)
 
@@ -225,30 +228,31 @@ class SizeSearch:
         """Keep what sizes gave."""
         expanded = {one.name: tuple(size) for one, size in zip(self.parts, sizes, strict=True) if size}
         residual = scored.misfit / scored.observations if scored.observations else float("nan")
-        self._scores[_key(sizes)] = unknowns, scored
-        self.tried[_key(sizes)] = Tried(expanded, scored.criterion, residual, scored.size)
+        key = _key(sizes)
+        weight = self.tried[key].weight if key in self.tried else 0.0
+        self._scores[key] = unknowns, scored
+        self.tried[key] = Tried(expanded, scored.criterion, residual, scored.size, weight)
 
-    def _rivals(self, around: Linearised, sizes: Sequence[Sequence[int]]) -> dict[str, list[Rival]]:
+    def _rivals(self, around: Linearised, sizes: Sequence[Sequence[int]]) -> dict[str, Rivals]:
         """Return the curves of all sizes that explain the record nearly as well, the one that was taken first, by name."""
-        taken = self._scores[_key(sizes)][0]
-        least = min(scored.criterion for _, scored in self._scores.values())
-        if not np.isfinite(least):
+        weights = weights_of({key: scored for key, (_, scored) in self._scores.items()})
+        count = [key for key, weight in weights.items() if weight > _NEGLIGIBLE]
+        whole = sum(weights[key] for key in count)
+        self.tried = {
+            key: replace(one, weight=weights[key] / whole if key in count else 0.0) for key, one in self.tried.items()
+        }
+        if not count:
             return {}
-        weights = {key: math.exp((least - scored.criterion) / 2) for key, (_, scored) in self._scores.items()}
-        whole = sum(weights.values())
-        others = [
-            (weights[key] / whole, unknowns)
-            for key, (unknowns, _) in self._scores.items()
-            if key != _key(sizes) and weights[key] > _NEGLIGIBLE * whole
-        ]
-        found: dict[str, list[Rival]] = {}
-        for weight, unknowns in [(1.0, taken), *others]:
+        taken, found = _key(sizes), dict[str, list[Rival]]()
+        for key in [taken, *(key for key in count if key != taken)]:
+            unknowns = self._scores[key][0]
             fitted = around.solve(unknowns, self._unseen_of(unknowns))
             for one, place in placed(unknowns):
                 if one.basis is not None:
-                    rival = Rival(weight, one.basis, fitted.values[place], fitted.root[place])
+                    rival = Rival(self.tried[key].weight, one.basis, fitted.values[place], fitted.root[place])
                     found.setdefault(one.name, []).append(rival)
-        return found
+        of_time = {part.name for part in self.parts if part.is_of_time}
+        return {name: Rivals(curves, is_averaged=name in of_time) for name, curves in found.items()}
 
     @cached_property
     def _unseen(self) -> Unseen:
@@ -311,16 +315,17 @@ def along_record(basis: Basis, factors: Array, rate: int = 0) -> Array:
     return found
 
 
-def errors_along(basis: Basis, root: Array, rivals: Sequence[Rival] = ()) -> Array:
-    """Return standard errors of a curve at every sample: from a root of its factors' covariance, and what the choice of its size adds."""
+def curve_along(basis: Basis, factors: Array, root: Array, rivals: Rivals) -> tuple[Array, Array]:
+    """Return a curve at every sample, and its standard errors: from a root of its factors' covariance, and what other sizes add."""
     samples = basis.coordinates[0].places.size
-    found = np.empty(samples)
+    values, errors = np.empty(samples), np.empty(samples)
     for first in range(0, samples, AT_A_TIME):
         some = slice(first, min(samples, first + AT_A_TIME))
         functions = basis.along(some, 0)
-        variance = ((functions @ root) ** 2).sum(axis=1)
-        found[some] = np.sqrt(variance + scatter(rivals, _functions_at(some)))
-    return found
+        moved, added = rivals.beside(_functions_at(some))
+        values[some] = functions @ factors + moved
+        errors[some] = np.sqrt(((functions @ root) ** 2).sum(axis=1) + added)
+    return values, errors
 
 
 def _functions_at(samples: slice) -> Callable[[Basis], Array]:

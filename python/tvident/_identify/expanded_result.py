@@ -17,10 +17,10 @@ from tvident._expansion import (
     ExpandedUnknown,
     Fitted,
     Linearised,
-    Rival,
+    Rivals,
     Tried,
     along_record,
-    errors_along,
+    curve_along,
     placed,
 )
 from tvident._identify.expanded_inputs import ExpandedInputs
@@ -55,7 +55,7 @@ class ExpandedOutcome:
     around : Linearised
         The rows around what was found.
     tried : sequence of Tried
-    rivals : mapping of str to sequence of Rival
+    rivals : mapping of str to Rivals
         Curves of other sizes.
     """
 
@@ -64,7 +64,7 @@ class ExpandedOutcome:
     fitted: Fitted
     around: Linearised
     tried: Sequence[Tried]
-    rivals: Mapping[str, Sequence[Rival]]
+    rivals: Mapping[str, Rivals]
 
     @property
     def ratio(self) -> float:
@@ -106,6 +106,7 @@ class ExpandedOutcome:
                     "criterion": np.array([each.criterion for each in self.tried]),
                     "residual": np.array([each.residual for each in self.tried]),
                     "parameters": np.array([each.parameters for each in self.tried]),
+                    "weight": np.array([each.weight for each in self.tried]),
                 },
                 limits=limits[0] if len(limits) == 1 else limits,
                 unit=self.given.data.units.get(one.name, ""),
@@ -113,7 +114,7 @@ class ExpandedOutcome:
                 _basis=one.basis,
                 _own=own,
                 _own_root=root,
-                _rivals=self.rivals.get(one.name, ()),
+                _rivals=self.rivals.get(one.name, Rivals()),
             )
         return found
 
@@ -130,8 +131,8 @@ class ExpandedOutcome:
                 constants[one.name] = (float(own[0]), float(np.linalg.norm(root[0])))
                 values[one.name], errors[one.name] = (np.full(count, number) for number in constants[one.name])
             else:
-                values[one.name] = along_record(one.basis, own)[step]
-                errors[one.name] = errors_along(one.basis, root, self.rivals.get(one.name, ()))[step]
+                along = curve_along(one.basis, own, root, self.rivals.get(one.name, Rivals()))
+                values[one.name], errors[one.name] = (each[step] for each in along)
         if "angle_zero" in constants:
             moved, error = constants["angle_zero"]
             constants["angle_zero"] = (given.zero + moved, error)

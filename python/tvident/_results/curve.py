@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from tvident._expansion import Basis, Rival, scatter
+from tvident._expansion import Basis, Rivals
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,8 +32,8 @@ class ExpandedParameter:
     size : int or (int, int)
         How many there are.
     coefficients : ndarray, shape (m,)
-        Their factors; of ``"powers"`` those of the powers of x from -1 to 1 over the limits, of two channels all products, the second
-        running faster.
+        Their factors, of the size that was taken; of ``"powers"`` those of the powers of x from -1 to 1 over the limits, of two channels
+        all products, the second running faster.
     covariance : ndarray, shape (m, m)
         Of the factors.
     limits : (float, float), or a pair of them
@@ -42,11 +42,12 @@ class ExpandedParameter:
         Even places within the limits: what the parameter is a function of.
     value, stderr : ndarray, shape (201,) or (201, 201)
         The curve there, and its standard error: K(position) with its band. It contains by how much curves of other sizes that explain
-        the record nearly as well differ.
+        the record nearly as well differ. Of time, where the record chooses the size, the curve is the mean over all sizes with the weights
+        of the table; otherwise it is that of ``coefficients``.
     sizes : dict of str to ndarray
         Every size that was tried: ``"size"``, ``"criterion"`` (corrected Akaike; the smallest size was taken whose criterion is at most 4
-        above the lowest), ``"residual"`` (mean square of the equations' residuals over their noise: 1 where noise explains them) and
-        ``"parameters"`` of the whole equation.
+        above the lowest), ``"residual"`` (mean square of the equations' residuals over their noise: 1 where noise explains them),
+        ``"parameters"`` of the whole equation, and ``"weight"``: exp(-(criterion + parameters)/4), of sum one.
     unit, unit_of : str
         Units of the parameter, and of what it is a function of.
 
@@ -58,6 +59,8 @@ class ExpandedParameter:
     References
     ----------
     C. M. Hurvich, C.-L. Tsai: Regression and time series model selection in small samples, Biometrika 76 (1989): the criterion.
+    G. Leung, A. R. Barron: Information theory and mixing least-squares regressions, IEEE Transactions on Information Theory 52 (2006): the
+    weights.
 
     Examples
     --------
@@ -86,7 +89,7 @@ class ExpandedParameter:
     _basis: Basis | None = field(default=None, repr=False)
     _own: Array = field(default_factory=lambda: np.zeros(0), repr=False)
     _own_root: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
-    _rivals: Sequence[Rival] = field(default=(), repr=False)
+    _rivals: Rivals = field(default=Rivals(), repr=False)
 
     @property
     def size(self) -> Any:
@@ -164,7 +167,8 @@ class ExpandedParameter:
         The expansion is explained in docs/expansions.md.
         """
         functions, inside, shape = self._at(positions)
-        return np.where(inside, functions @ self._own, np.nan).reshape(shape)
+        moved, _ = self._beside(positions)
+        return np.where(inside, functions @ self._own + moved, np.nan).reshape(shape)
 
     def stderr_at(self, *positions: npt.ArrayLike) -> Array:
         """Return standard errors of the curve at places within the limits; NaN outside of them.
@@ -189,8 +193,8 @@ class ExpandedParameter:
         """
         functions, inside, shape = self._at(positions)
         variance = ((functions @ self._own_root) ** 2).sum(axis=1)
-        places = self._places(positions)
-        variance = np.maximum(variance, 0) + scatter(self._rivals, lambda basis: basis.at(places))
+        _, added = self._beside(positions)
+        variance = np.maximum(variance, 0) + added
         return np.where(inside, np.sqrt(np.maximum(variance, 0)), np.nan).reshape(shape)
 
     def plot(self, *, truth: Any = None, ax: Axes | Sequence[Axes] | None = None) -> Figure:
@@ -248,6 +252,11 @@ class ExpandedParameter:
         places = self._unclipped(positions)
         inside = np.all([(place >= 0) & (place <= 1) for place in places], axis=0)
         return self._functions.at(self._places(positions)), inside, shape
+
+    def _beside(self, positions: Sequence[npt.ArrayLike]) -> tuple[Array | float, Array | float]:
+        """Return what other sizes add to the curve that was taken, and to its variance."""
+        places = self._places(positions)
+        return self._rivals.beside(lambda basis: basis.at(places))
 
     def _unclipped(self, positions: Sequence[npt.ArrayLike]) -> list[Array]:
         """Return positions as parts of the range of each channel."""
