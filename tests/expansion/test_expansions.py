@@ -321,6 +321,24 @@ def test_a_schedule_and_a_size_that_is_given_are_one_curve(short: tvident.Record
         np.testing.assert_allclose(np.polynomial.legendre.legval(x, curve.coefficients), curve.value, rtol=1e-9)
 
 
+@pytest.mark.first(1)
+@pytest.mark.parametrize(
+    ("family", "duration", "seed"), [("legendre", 30.0, 1), *long(("bspline", 40.0, 1), ("legendre", 30.0, 2))]
+)
+def test_an_expansion_that_needs_more_than_the_largest_size_is_said(family: str, duration: float, seed: int) -> None:
+    # Curves are 2 to 3.4 standard errors off, for 0.6 to 0.8 with twice as many functions.
+    rig = tvident.simulate_torsional_rig(duration=duration, seed=seed, angle_noise=1e-2)
+    few = identify(rig, stiffness=Expansion(family))
+    assert few.record_status & Status.KIND_CONTRADICTED
+    assert any("needs more than the 64 functions" in line for line in few.advice)
+    many = identify(rig, stiffness=Expansion(family, largest=100))
+    assert not many.record_status
+    assert error(many, rig) < 0.7 * error(few, rig)
+    # Sizes that nearly suffice are no fault.
+    rig = tvident.simulate_torsional_rig(duration=20.0, seed=seed, angle_noise=1e-2)
+    assert not identify(rig, stiffness=Expansion(family)).record_status
+
+
 def test_errors_are_as_large_as_is_said() -> None:
     squares, of_curves = [], []
     # Over seeds 600 to 639 the means are 0.92 and 0.90.

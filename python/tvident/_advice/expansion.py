@@ -22,6 +22,12 @@ _STANDARD = 4.0
 _SHOWN = 5
 """Jumps that are named."""
 
+_LAST = 1 / 8
+"""Of the sizes, by which it is seen whether more functions would explain more."""
+
+_CHARGED = 2.0
+"""What the criterion charges for a function."""
+
 _EQUIVALENT = 4.0
 """Sizes whose criterion is at most so much higher are told from the best by chance."""
 
@@ -59,8 +65,22 @@ class FoundExpansion:
 
     @property
     def is_contradicted(self) -> bool:
-        """Whether windows find another parameter."""
-        return bool(self.missed_jumps) or self._differs
+        """Whether windows find another parameter, or more functions would."""
+        return bool(self.missed_jumps) or self._differs or self.needs_more
+
+    @property
+    def needs_more(self) -> bool:
+        """Whether the largest sizes still explain so much more that what is left may be larger than noise makes a curve.
+
+        The last eighth of the sizes then lowers the criterion by more than all functions are charged for.
+        """
+        tried, criterion = np.asarray(self.sizes["size"]), np.asarray(self.sizes["criterion"])
+        if not self.chosen or tried.ndim > 1:
+            return False
+        is_last = tried > (1 - _LAST) * self.largest
+        if is_last.all() or not is_last.any():
+            return False
+        return bool(criterion[~is_last].min() - criterion[is_last].min() > _CHARGED * self.largest)
 
     @property
     def _differs(self) -> bool:
@@ -156,6 +176,12 @@ def _size(one: FoundExpansion, observations: float) -> str:
 
 def _at_end(one: FoundExpansion) -> list[str]:
     """Return what to do where the largest size was taken: more may be better."""
+    if one.needs_more:
+        words = (
+            f"{one.name} needs more than the {one.largest} functions that are tried: the last of them still explain more than chance does "
+            "with all, and what is left moves the curve by more than its errors; raise largest=, or let it be windowed"
+        )
+        return [words]
     largest = int(np.max(np.atleast_1d(one.size)))
     if not one.chosen or 2 * largest <= one.largest:
         return []
