@@ -150,7 +150,7 @@ def test_errors_of_a_trend_hold_up_to_its_ends(kind: str, colour: str) -> None:
         assert (fit.stderr > 0).all()
         covered.append([np.mean(np.abs(fit.derivatives[d] - truth[d]) < 1.96 * fit.stderr[d]) for d in (1, 2)])
     # All of a record is one window: eight records hold eight that share nothing.
-    assert (np.mean(covered, axis=0) > COVERAGE[0] - 0.1).all(), covered
+    assert (np.mean(covered, axis=0) > COVERAGE[0] - 0.06).all(), covered
 
 
 @pytest.mark.parametrize("colour", ["0", "0.3", "0.5", *long("0.8", "0.9")])
@@ -172,7 +172,7 @@ def test_a_trend_has_windows_as_long_as_itself(kind: str, degree: int, colour: s
             covered.append(np.mean(np.abs(error) < 1.96 * fit.stderr[d]))
     # By chance some records seem to bend, and have windows of their own.
     assert np.exp(np.mean(np.log(np.reshape(ratios, (-1, 3))), axis=0)).max() <= AT_MOST, np.reshape(ratios, (-1, 3))
-    assert np.mean(np.reshape(covered, (-1, 3)), axis=0).min() > COVERAGE[0] - 0.1, covered
+    assert np.mean(np.reshape(covered, (-1, 3)), axis=0).min() > COVERAGE[0] - 0.03, covered
 
 
 @pytest.mark.parametrize("samples", [4000, *long(100_000)])

@@ -9,7 +9,7 @@
 //! mean of c_j² / q_jᵀΓq_j = 1 ± √(2/ν).
 //! ```
 //!
-//! In long records a mean over all windows would not see what happens in one of them: there no window by itself may exceed chance.
+//! A mean over all windows would not see what happens in one of them, so no window by itself may exceed chance either.
 
 use crate::auto_derivatives::block_means::BlockMeans;
 use crate::auto_derivatives::whole_record::{DEGREES, LONGEST, WholeRecord, WindowCoefficients};
@@ -76,7 +76,7 @@ impl ParabolicTrend {
         if test.degree_from(0, &whole.coefficients.map(|c| c * c / densest)).is_none() {
             return Ok(None);
         }
-        let covariances = whole.covariances(noise);
+        let covariances = whole.covariances(noise)?;
         let power = std::array::from_fn(|degree| whole.coefficients[degree].powi(2) / covariances[degree][degree]);
         let Some(mut degree) = test.degree_from(0, &power) else { return Ok(None) };
         let shorter = std::iter::successors(Some(samples / SHORTER), |length| Some(length / SHORTER));
@@ -86,7 +86,7 @@ impl ParabolicTrend {
             let windows = TestedWindows::new(means.of(step), length / step, step, noise, instructions)?;
             let test = NoiseAlone::new(noise, windows.count);
             let Some(found) = test.degree_from(degree, &windows.power) else { return Ok(None) };
-            if samples > LONGEST && windows.largest > test.largest() {
+            if windows.largest > test.largest() {
                 return Ok(None);
             }
             degree = found;

@@ -8,8 +8,8 @@
 //! ```
 //!
 //! `λ` is what a degree must gain to count. A record that bends a little less than that still bends, and the next degree would have moved
-//! derivatives by several times the noise of this one. So errors are those of the same average with `λ = 5`, and hold the distance of each
-//! order from the estimate.
+//! derivatives by several times the noise of this one. So errors are those of the same average with `λ = 2`, what Akaike's criterion asks, and hold
+//! the distance of each order from the estimate.
 
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -40,7 +40,7 @@ const HIGHEST: usize = 6;
 
 /// What a degree must gain to count in estimates, and in their errors.
 const CHARGE: f64 = 8.0;
-const CHARGE_OF_ERRORS: f64 = 5.0;
+const CHARGE_OF_ERRORS: f64 = 2.0;
 
 /// Places in half a record at which errors are computed; between them they are interpolated.
 const PLACES: usize = 64;
@@ -97,7 +97,14 @@ impl WholeRecord {
     }
 
     /// The covariances of the coefficients.
-    pub(crate) fn covariances(&self, noise: &CorrelatedNoise) -> Vec<[f64; DEGREES]> {
+    ///
+    /// # Errors
+    /// If there is not the memory.
+    pub(crate) fn covariances(&self, noise: &CorrelatedNoise) -> Result<Vec<[f64; DEGREES]>, Error> {
+        if !noise.is_white() {
+            // A row at the samples, and what it becomes.
+            memory::ask_for_numbers(self.samples.saturating_mul(2))?;
+        }
         let (length, share) = (self.basis.length(), 1.0 / self.step as f64);
         let variance = noise.variance();
         let row = |degree: usize| {
@@ -120,7 +127,7 @@ impl WholeRecord {
             let mut sums = sums.into_iter().enumerate().map(kept);
             std::array::from_fn(|_| sums.next().unwrap_or(0.0))
         };
-        (0..DEGREES).map(row).collect()
+        Ok((0..DEGREES).map(row).collect())
     }
 
     /// Estimates a derivative at all samples. Returns the order of most weight.
@@ -252,7 +259,7 @@ mod tests {
         let record = record.as_slice();
         let (means, instructions) = (BlockMeans::new(&record, samples / 4).expect("memory"), Instructions::current());
         let whole = WholeRecord::new(&means, instructions).expect("memory");
-        let covariances = whole.covariances(noise);
+        let covariances = whole.covariances(noise).expect("memory");
         let delta = 1.0 / samples as f64;
         let target =
             WholeTarget { derivative, highest: 15, fixed: false, delta, covariances: &covariances, instructions };
@@ -305,13 +312,13 @@ mod tests {
         let whole = WholeRecord::new(&means, Instructions::current()).expect("memory");
         assert_eq!(whole.step, 27);
         let noise = CorrelatedNoise::new(1.0, vec![(0.9, 1.0), (0.999, 0.1)]);
-        let covariances = whole.covariances(&noise);
+        let covariances = whole.covariances(&noise).expect("memory");
         // A coefficient of degree j sees frequencies of some j/2 cycles a record.
         for (degree, row) in covariances.iter().enumerate().take(4) {
             let ratio = row[degree] * whole.step as f64 / noise.density(0.0);
             assert!((0.9..1.01).contains(&ratio), "{degree}: {ratio}");
         }
-        let white = whole.covariances(&CorrelatedNoise::white(2.0));
+        let white = whole.covariances(&CorrelatedNoise::white(2.0)).expect("memory");
         assert!((white[3][3] * 27.0 / 2.0 - 1.0).abs() < 1e-9 && white[3][1].abs() < 1e-9);
     }
 
