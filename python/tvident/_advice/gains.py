@@ -14,6 +14,8 @@ from tvident._advice.events import jumps_beside_pulses
 from tvident._advice.lists import listed
 from tvident._equation import COEFFICIENTS
 
+Array = npt.NDArray[np.float64]
+
 _ONE_FACTOR = 0.2
 """Inertia and stiffness change by one factor where they differ from it by less than this part of its change."""
 
@@ -115,16 +117,16 @@ class Gains:
             return []
         errors = {name: one.stderr * one.factor / abs(np.mean(one.values[there])) for name, one in changing.items()}
         # An inertia may change beside a gain, too; then damping and stiffness tell.
-        return self._following("inertia", there, errors) or self._following("stiffness", there, errors)
+        values = {name: one.values for name, one in changing.items()}
+        return self._following("inertia", there, values, errors) or self._following("stiffness", there, values, errors)
 
     def _following(
-        self, first: str, there: npt.NDArray[np.bool_], errors: Mapping[str, npt.NDArray[np.float64]]
+        self, first: str, there: npt.NDArray[np.bool_], values: Mapping[str, Array], errors: Mapping[str, Array]
     ) -> list[str]:
         """Return that a gain may drift, where others change by the factor of the first."""
         # Near the ends little is known, and curves go astray.
         known = there & (errors[first] <= _AS_KNOWN * np.median(errors[first][there]))
-        of = {name: one.values[known] for name, one in self._changing().items()}
-        changes = {name: values / np.mean(values) - 1 for name, values in of.items()}
+        changes = {name: one[known] / np.mean(one[known]) - 1 for name, one in values.items()}
         error = {name: _root_mean_square(one[known]) for name, one in errors.items()}
         by = changes[first]
         change = _root_mean_square(by)
@@ -140,7 +142,9 @@ class Gains:
             follow += ["stiffness"]
         if not follow:
             return []
-        rather = _RATHER[len(follow)] + ("" if first == "inertia" else ", beside an inertia that changes")
+        rather = _RATHER[len(follow)]
+        if first != "inertia":
+            rather = f"{rather}, beside an inertia that changes (or damping follows stiffness, as in rubber and muscle)"
         words = (
             f"{listed(sorted([first, *follow], key=COEFFICIENTS.index))} change by one factor ({np.min(by):+.1%} to {np.max(by):+.1%}): "
             f"the gain of the torque or of the angle seems to drift or jump, rather than {rather}: {_TRUSTED}"

@@ -39,7 +39,8 @@ def scales_compared(found: _core.Identification, flags: Status) -> list[str]:
     narrowest, widest = scan.plateau
     only = "" if _is_wide(scan) else " alone"
     samples = f"{scan.window_length[narrowest]} to {scan.window_length[widest]} samples"
-    agree = f"estimates are the same from {samples} of the test function{only}{_but_for(scan)}"
+    but_for = "" if Status.SCALES_DISAGREE in flags else _but_for(scan)
+    agree = f"estimates are the same from {samples} of the test function{only}{but_for}"
     if narrowest == 0 or not scan.moved:
         return [agree]
     return [

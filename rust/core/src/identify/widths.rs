@@ -107,10 +107,15 @@ impl Widths {
         found
     }
 
-    /// The longest plateau, and the longest of those with the correction for noise; where there is none, of widths that are alike.
-    pub(crate) fn plateaus(mut self) -> Scans {
+    /// The longest plateau, and the longest of those with the correction for noise.
+    pub(crate) fn plateaus(&mut self) -> Scans {
         self.scans.iter_mut().flatten().for_each(Scan::find_plateau);
-        let found = self.longest_plateaus();
+        self.longest_plateaus()
+    }
+
+    /// The same; where there is none, of widths that are alike, whose differences errors have to hold.
+    pub(crate) fn plateaus_or_alike(&mut self) -> Scans {
+        let found = self.plateaus();
         if !found.best.has_no_plateau() {
             return found;
         }

@@ -29,8 +29,9 @@ pub(crate) fn longest_run(holds: &[bool], places: Range<usize>) -> Option<Range<
 pub(crate) enum Drive {
     /// It is within chance of its noise.
     Never,
-    /// It is in most of them.
+    /// It is within chance of its noise in most of them.
     NowAndThen,
+    /// It is more than its noise in most of them.
     Always,
 }
 

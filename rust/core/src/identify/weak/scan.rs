@@ -141,7 +141,7 @@ impl Session<'_, '_, '_> {
             widths.add(&one, &mut self.stages)?;
             half = wider(half);
         }
-        Ok(widths.plateaus())
+        Ok(widths.plateaus_or_alike())
     }
 
     /// Rows of all of a record, or of stretches of a long one, and where the stretches begin and end among them.
