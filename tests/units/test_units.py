@@ -187,6 +187,7 @@ def test_words_are_no_units(text: str) -> None:
         ("timestamps", ("timestamps", "")),
         ("header.stamp.nanosec", ("header.stamp.nanosec", "")),
         ("motor_current_A", ("motor_current", "A")),
+        ("phase_current_A", ("phase_current_A", "")),
         ("Strom mA", ("Strom", "mA")),
         ("joint_A", ("joint_A", "")),
         ("deg", ("deg", "deg")),
@@ -267,7 +268,10 @@ def test_slices_keep_their_unit_and_what_is_computed_has_none() -> None:
         assert isinstance(kept, Channel)
         assert kept.unit == "deg"
     np.testing.assert_array_equal(angle - angle[0], np.arange(10.0))
-    for other in (angle - Channel(angle, "rad"), np.add.reduce(angle), np.subtract.outer(angle, angle)):
+    with pytest.raises(ValueError, match="must be in one unit; got 'deg' and 'rad'; convert one with"):
+        angle - Channel(angle, "rad")
+    assert (angle - Channel(angle, "°")).unit == "deg"
+    for other in (np.add.reduce(angle), np.subtract.outer(angle, angle)):
         assert not isinstance(other, Channel)
     moved = angle.copy()
     moved -= 1

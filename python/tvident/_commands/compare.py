@@ -129,7 +129,7 @@ def _methods(
     axis = axis_of(
         angle, torque, times, **{name: common.get(name) for name in ("angle_unit", "torque_unit", "time_unit")}
     )
-    rate = common.get("sample_rate") or (1 / common["delta"] if "delta" in common else None)
+    rate = common.get("sample_rate") or (1 / (axis.time * common["delta"]) if "delta" in common else None)
     rate = rate or 1 / (axis.time * float(np.median(np.diff(np.asarray(times, np.float64)))))
     known = {}
     for name in COEFFICIENTS:

@@ -14,7 +14,7 @@ from tvident._files import printable
 from tvident._units import LINEAR, ROTARY, Channel, factor_to, is_convertible, unit_said
 
 _CLOSE = 1e-3
-"""By which share of it a scale may differ from what converts a unit, and still is what converts it: 0.0175 for degrees."""
+"""By which share of it a scale may differ from what converts a unit, and still is what converts it: 0.01745 for degrees."""
 
 
 def factor_of(scale: str, channels: recordings.Channels, file: str | None) -> Any:

@@ -135,9 +135,9 @@ def identify(
         angle and those of the torque, which may differ in number, rate and beginning.
     angle_unit, torque_unit, time_unit : str, optional
         Units of `angle`, `torque`, and of `t` and `delta`: ``"deg"``, ``"N mm"``, ``"ms"`` and others. By default what an array says of
-        itself (a :class:`Channel`, a quantity of pint, ``attrs["units"]`` of xarray), or else rad, N m and s. A position in m, mm or in
-        and a force in N or lbf make the axis linear: results are in kg, N s/m and N/m. `quantisation` and `period` are in the unit of the
-        angle, parameters and terms in those of results.
+        itself (a :class:`Channel`, a quantity of pint; of times ``attrs["units"]`` of xarray, too), or else rad, N m and s. A position in
+        m, mm or in and a force in N or lbf make the axis linear: results are in kg, N s/m and N/m. `quantisation` and `period` are in the
+        unit of the angle, parameters and terms in those of results.
     method : {"auto", "paper"}, WeakForm or StrongForm, optional
         ``"auto"``: weak form, all settings chosen from the record, inertia and damping constant unless a test rejects it, an offset of
         the torque. ``"paper"``: the paper's method: strong form, polynomials in windows of 201 samples, regression windows of 200, all

@@ -129,8 +129,13 @@ def _kept(ufunc: Any, method: str, inputs: tuple[Any, ...]) -> str:
     """Return the unit that what is computed still has; an empty string where it has another, or none."""
     if method != "__call__" or ufunc not in (*_SIGNS, *_SUMS):
         return ""
-    units = {one.unit for one in inputs if isinstance(one, Channel)}
-    return units.pop() if len(units) == 1 else ""
+    units = list(dict.fromkeys(one.unit for one in inputs if isinstance(one, Channel)))
+    if len({(known.dimension, known.factor) if (known := unit_of(unit)) else unit for unit in units}) > 1:
+        raise UnitError(
+            f"what is added must be in one unit; got {_shown(units[0])} and {_shown(units[1])}; convert one with "
+            f".to({units[0]!r}), or take plain numbers with np.asarray()"
+        )
+    return units[0] if units else ""
 
 
 def unit_said(values: Any) -> str:
@@ -159,7 +164,9 @@ def has_unit_in_attributes(values: Any) -> bool:
     """Return whether an attribute of a container alone says its unit: what is computed from it keeps the attribute."""
     if isinstance(values, list | tuple):
         return bool(values) and has_unit_in_attributes(values[0])
-    return not isinstance(values, np.ndarray) and not hasattr(values, "magnitude") and bool(_in_attributes(values))
+    # Of a file that is open nothing was computed.
+    computes = hasattr(values, "to_numpy") and not hasattr(values, "magnitude")
+    return computes and not isinstance(values, np.ndarray) and bool(_in_attributes(values))
 
 
 def _in_attributes(values: Any) -> str:

@@ -45,7 +45,7 @@ _TORQUES = {"nm": "Nm", "nmm": "Nmm", "mnm": "mNm", "knm": "kNm"}
 
 
 _OF_CURRENTS = re.compile(
-    r"(.*(?i:current|strom|courant|corriente|corrente|voltage|spannung).*?)[_\s]+([mk]?[AV])", re.DOTALL
+    r"(?!.*(?i:phase))(.*(?i:current|strom|courant|corriente|corrente|voltage|spannung).*?)[_\s]+([mk]?[AV])", re.DOTALL
 )
 """Units of one letter, which would be a second channel's elsewhere: A and B."""
 

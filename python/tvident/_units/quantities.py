@@ -170,8 +170,9 @@ def factor_of_derivative(system: System, name: str, text: str) -> float:
     if unit is not None and system is ROTARY and unit.dimension in {_PER_SECOND, _PER_SECOND_SQUARED}:
         if unit.dimension == _PER_SECOND and math.isclose(unit.factor, _PER_MINUTE):
             return math.tau * unit.factor
+        turns = "rpm or rev/s" if unit.dimension == _PER_SECOND else "rev/s^2"
         raise UnitError(
-            f"the {name} must say whether radians or turns are counted; got {text!r}; write {wanted}, rpm or rev/s, or pass plain "
+            f"the {name} must say whether radians or turns are counted; got {text!r}; write {wanted}, {turns}, or pass plain "
             f"numbers in {wanted}"
         )
     return factor_between(text, wanted, name=f"the {name}")
