@@ -72,6 +72,8 @@ def test_a_comment_may_be_about_values_that_are_missing(tmp_path: Path) -> None:
     for wrong in ("#NV,bad", "#NV,0x10"):
         with pytest.raises(recordings.FileError, match="line 3 must hold numbers"):
             read(tmp_path, f"t,x\n1,2\n{wrong}\n2,3\n")
+    with pytest.raises(recordings.FileError, match="line 3 must hold numbers"):
+        read(tmp_path, "t,x,y\n1,2,3\n#N/A,ERR,ERR\n2,3,4\n")
     with pytest.warns(recordings.FileWarning, match="'state': not read"):
         assert len(read(tmp_path, "t,x,state\n1,2,a\n2,3,b\n#NV,#NV,b\n3,4,c\n")["t"]) == 4
 

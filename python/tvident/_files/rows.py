@@ -124,7 +124,7 @@ class Rows:
         cells = split(last, self._dialect.separator)
         if not last.strip() or self._words is not None or "#" in last or self._is_end(cells):
             return text
-        rows = [split(line, self._dialect.separator) for line in above.split("\n")[1:]]
+        rows = [self._cells(line) for line in above.split("\n")[1:]]
         lacks = what_lacks(
             cells, [row for row in rows if len(row) == self._width], is_time=self._width - 1 in self.times
         )
@@ -257,17 +257,26 @@ class Rows:
         return np.array(rows, dtype=np.float64).reshape(-1, self._width)
 
     def _is_remark(self, line: str) -> bool:
-        """Return whether a line is a comment about what is missing; of as many cells as columns one word may be a wrong number."""
+        """Return whether a line is a comment about what is missing; of as many cells as columns it may be a row of what is missing."""
         if not line.lstrip().startswith("#") or not self._dialect.is_plain:
             return False
-        return is_remark(line, least=2 if len(split(line, self._dialect.separator)) == self._width else 1)
+        cells = split(line, self._dialect.separator)
+        is_row = len(cells) == self._width
+        # A cell of several words is no number that went wrong.
+        if is_row and self._dialect.separator is not None and not any(" " in cell.strip() for cell in cells):
+            return False
+        return is_remark(line, least=2 if is_row else 1)
+
+    def _cells(self, line: str) -> list[str]:
+        """Return the cells of a line; separators at its end make none beyond the columns."""
+        cells = split(line, self._dialect.separator)
+        while len(cells) > self._width and not cells[-1]:
+            cells.pop()
+        return cells
 
     def _row(self, place: int, line: str) -> list[float] | None:
         """Return the numbers of a line, or None where it holds words that may be the end of the table."""
-        d = self._dialect
-        cells = split(line, d.separator)
-        while len(cells) > self._width and not cells[-1]:
-            cells.pop()
+        cells = self._cells(line)
         if self._words is not None and not any(cells):
             return None
         values = self._plain(line, cells)
