@@ -294,7 +294,7 @@ def test_errors_know_that_another_size_might_have_been_taken() -> None:
     np.testing.assert_allclose(curve.stderr_at(short.time), chosen.stderr["stiffness"], rtol=1e-6)
 
 
-@pytest.mark.parametrize("seeds", [range(16100, 16103), *long(range(16103, 16110))])
+@pytest.mark.parametrize("seeds", [range(16100, 16101), *long(range(16101, 16110))])
 def test_a_curve_of_time_is_nearly_as_good_as_the_best_size(seeds: range) -> None:
     # Ten seeds: 1.09; the size that is taken alone has 1.17.
     ratios = []
@@ -321,22 +321,28 @@ def test_a_schedule_and_a_size_that_is_given_are_one_curve(short: tvident.Record
         np.testing.assert_allclose(np.polynomial.legendre.legval(x, curve.coefficients), curve.value, rtol=1e-9)
 
 
-@pytest.mark.first(1)
 @pytest.mark.parametrize(
-    ("family", "duration", "seed"), [("legendre", 30.0, 1), *long(("bspline", 40.0, 1), ("legendre", 30.0, 2))]
+    ("family", "duration", "seed", "largest", "enough"),
+    [
+        ("legendre", 10.0, 1, 16, 32),
+        ("legendre", 10.0, 2, 16, 32),
+        *long(("bspline", 40.0, 1, 64, 100), ("legendre", 30.0, 1, 64, 100), ("legendre", 30.0, 2, 64, 100)),
+    ],
 )
-def test_an_expansion_that_needs_more_than_the_largest_size_is_said(family: str, duration: float, seed: int) -> None:
-    # Curves are 2 to 3.4 standard errors off, for 0.6 to 0.8 with twice as many functions.
+def test_an_expansion_that_needs_more_than_the_largest_size_is_said(
+    family: str, duration: float, seed: int, largest: int, enough: int
+) -> None:
+    # With 64 functions curves are 2 to 3.4 standard errors off, for 0.6 to 0.8 with twice as many.
     rig = tvident.simulate_torsional_rig(duration=duration, seed=seed, angle_noise=1e-2)
-    few = identify(rig, stiffness=Expansion(family))
+    few = identify(rig, stiffness=Expansion(family, largest=largest))
     assert few.record_status & Status.KIND_CONTRADICTED
-    assert any("needs more than the 64 functions" in line for line in few.advice)
-    many = identify(rig, stiffness=Expansion(family, largest=100))
+    assert any(f"needs more than the {largest} functions" in line for line in few.advice)
+    many = identify(rig, stiffness=Expansion(family, largest=enough))
     assert not many.record_status
     assert error(many, rig) < 0.7 * error(few, rig)
     # Sizes that nearly suffice are no fault.
-    rig = tvident.simulate_torsional_rig(duration=20.0, seed=seed, angle_noise=1e-2)
-    assert not identify(rig, stiffness=Expansion(family)).record_status
+    rig = tvident.simulate_torsional_rig(duration=duration / 2, seed=seed, angle_noise=1e-2)
+    assert not identify(rig, stiffness=Expansion(family, largest=largest)).record_status
 
 
 def test_errors_are_as_large_as_is_said() -> None:

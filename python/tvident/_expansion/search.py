@@ -251,7 +251,7 @@ class SizeSearch:
                 if one.basis is not None:
                     rival = Rival(self.tried[key].weight, one.basis, fitted.values[place], fitted.root[place])
                     found.setdefault(one.name, []).append(rival)
-        of_time = {part.name for part in self.parts if part.is_of_time}
+        of_time = {part.name for part in self.parts if part.is_of_time and None in part.sizes}
         return {name: Rivals(curves, is_averaged=name in of_time) for name, curves in found.items()}
 
     @cached_property
