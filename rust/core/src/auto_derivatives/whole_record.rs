@@ -251,8 +251,13 @@ mod tests {
     use super::*;
     use crate::noise::quantisation::tests::uniform;
 
-    /// A parabola and noise of some variance, and what is found of a derivative: estimates, errors and the order.
-    fn found(samples: usize, noise: &CorrelatedNoise, derivative: usize) -> (Vec<f64>, Vec<f64>, usize) {
+    /// A parabola and noise of some variance, and what is found of a derivative, with one order or any: estimates, errors and the order.
+    fn found(
+        samples: usize,
+        noise: &CorrelatedNoise,
+        derivative: usize,
+        only: Option<usize>,
+    ) -> (Vec<f64>, Vec<f64>, usize) {
         let sigma = noise.variance().sqrt() * 12.0_f64.sqrt();
         let parabola = |(i, e): (usize, f64)| sigma * e + parabola(i as f64 / samples as f64, 0);
         let record: Vec<f64> = uniform(samples).into_iter().enumerate().map(parabola).collect();
@@ -261,8 +266,8 @@ mod tests {
         let whole = WholeRecord::new(&means, instructions).expect("memory");
         let covariances = whole.covariances(noise).expect("memory");
         let delta = 1.0 / samples as f64;
-        let target =
-            WholeTarget { derivative, highest: 15, fixed: false, delta, covariances: &covariances, instructions };
+        let (highest, fixed) = (only.unwrap_or(15), only.is_some());
+        let target = WholeTarget { derivative, highest, fixed, delta, covariances: &covariances, instructions };
         let (mut values, mut errors, mut order) = (vec![0.0; samples], vec![0.0; samples], vec![0; samples]);
         let outputs = &mut DerivativeOutputs { values: &mut values, errors: &mut errors, order: &mut order };
         let order = whole.estimate(&target, outputs);
@@ -277,18 +282,19 @@ mod tests {
     fn a_parabola_is_found_by_samples_and_by_means() {
         for samples in [1000, 1001, 70_000, 70_001, 300_002] {
             for derivative in 0..3 {
-                let (values, errors, order) = found(samples, &CorrelatedNoise::white(1e-4), derivative);
+                let (values, errors, order) = found(samples, &CorrelatedNoise::white(1e-4), derivative, None);
                 assert_eq!(order, 2, "{samples}, {derivative}");
                 for (i, (value, error)) in values.iter().zip(&errors).enumerate() {
                     let away = value - parabola(i as f64 / samples as f64, derivative);
                     assert!(away.abs() < 4.5 * error, "{samples}, {derivative}, {i}: {away} {error}");
                 }
-                // The variance of the derivative of highest order is known: 720 σ²/n of a parabola over a time of one.
+                // The variance of the derivative of highest order is known: 720 σ²/n of a parabola over a time of one. Less than two means,
+                // of 27 in 70 000 samples, have no part in it: 2.5 times their share of the record. Higher orders have their share.
                 if derivative == 2 {
                     let expected = (720.0 * 1e-4 / samples as f64).sqrt();
-                    let ratio = errors[samples / 2] / expected;
-                    // Higher orders have their share.
-                    assert!((0.999..2.0).contains(&ratio), "{samples}: {ratio}");
+                    let (_, alone, _) = found(samples, &CorrelatedNoise::white(1e-4), derivative, Some(2));
+                    assert!((alone[samples / 2] / expected - 1.0).abs() < 2e-3, "{samples}: {}", alone[samples / 2]);
+                    assert!(errors[samples / 2] > 0.999 * expected, "{samples}: {}", errors[samples / 2]);
                 }
             }
         }
@@ -296,8 +302,8 @@ mod tests {
 
     #[test]
     fn noise_that_is_correlated_makes_errors_larger() {
-        let white = found(2000, &CorrelatedNoise::white(1e-4), 2).1;
-        let other = found(2000, &CorrelatedNoise::new(0.0, vec![(0.8, 1e-4)]), 2).1;
+        let white = found(2000, &CorrelatedNoise::white(1e-4), 2, Some(2)).1;
+        let other = found(2000, &CorrelatedNoise::new(0.0, vec![(0.8, 1e-4)]), 2, Some(2)).1;
         // Its density at low frequencies is nine times that of white noise.
         let ratio = other[1000] / white[1000];
         assert!((ratio / 3.0 - 1.0).abs() < 0.3, "{ratio}");
