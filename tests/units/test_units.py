@@ -270,7 +270,8 @@ def test_slices_keep_their_unit_and_what_is_computed_has_none() -> None:
     np.testing.assert_array_equal(angle - angle[0], np.arange(10.0))
     with pytest.raises(ValueError, match="must be in one unit; got 'deg' and 'rad'; convert one with"):
         angle - Channel(angle, "rad")
-    assert (angle - Channel(angle, "°")).unit == "deg"
+    written_otherwise: Any = angle - Channel(angle, "°")
+    assert written_otherwise.unit == "deg"
     for other in (np.add.reduce(angle), np.subtract.outer(angle, angle)):
         assert not isinstance(other, Channel)
     moved = angle.copy()
