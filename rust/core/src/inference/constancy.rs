@@ -13,7 +13,7 @@
 //!
 //! Where no torque acts the equation is homogeneous: in a free decay, or at rest, it holds for any multiple of the parameters, and least squares finds
 //! the smallest, zero. Parts whose torque is no more than its noise are left out, and of a block the longest run of others stands for it. Where a hammer
-//! strikes now and then, the torque of most samples is noise in every part: a block that is struck stands as it is, as what rings was set in motion there.
+//! strikes now and then, the torque of most samples is noise in every part: blocks that are struck stand as they are then, as what rings was set in motion there.
 
 use std::ops::Range;
 
@@ -188,10 +188,14 @@ pub(crate) fn test(
     // One alone is between two movements.
     let is_alone = |index: usize| !(index > 0 && free[index - 1] || free.get(index + 1) == Some(&true));
     let driven: Vec<bool> = (0..free.len()).map(|index| !free[index] || is_alone(index)).collect();
-    let blocks = (0..BLOCKS).map(|block| PARTS * block..PARTS * (block + 1));
-    let struck = |parts: &Range<usize>| drives(at(parts.start)..at(parts.end)) != Drive::Never;
-    let stands = |parts: Range<usize>| longest_run(&driven, parts.clone()).or_else(|| Some(parts).filter(struck));
-    let runs = blocks.filter_map(stands).map(|run| piece(at(run.start)..at(run.end)));
+    let blocks = || (0..BLOCKS).map(|block| PARTS * block..PARTS * (block + 1));
+    let mut runs: Vec<_> = blocks().filter_map(|parts| longest_run(&driven, parts)).collect();
+    // What is driven now and then is compared where nothing else can be: elsewhere it is the end of a drive before a rest.
+    if runs.len() < 2 {
+        let struck = |parts: &Range<usize>| drives(at(parts.start)..at(parts.end)) != Drive::Never;
+        runs = blocks().filter(struck).collect();
+    }
+    let runs = runs.into_iter().map(|run| piece(at(run.start)..at(run.end)));
     let estimates = stages.map(runs.collect(), || (), estimate)?;
     let of = |estimates: &[Estimate], constant: usize| -> Vec<(f64, f64)> {
         estimates.iter().flatten().map(|(values, variances)| (values[constant], variances[constant])).collect()
