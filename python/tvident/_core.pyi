@@ -59,6 +59,7 @@ from tvident._core_stubs.streams import (
 )
 
 __all__ = [
+    "AGREE",
     "CONSPICUOUS",
     "CORRELATED_NOISE",
     "FEWEST_SAMPLES",
@@ -130,6 +131,7 @@ __all__ = [
     "unread_counts",
 ]
 
+AGREE: float
 CONSPICUOUS: float
 CORRELATED_NOISE: float
 FEWEST_SAMPLES: int

@@ -15,9 +15,6 @@ from tvident._status import Status
 _NEAR = 3
 """Widths about the one that is used, at least, to say by how much their parameters differ."""
 
-_AGREE = 2.0
-"""Estimates agree that differ by no more than so many standard errors, the smaller of the two."""
-
 _TOLD = 3.0
 """Standard errors by which a number differs from zero, at least, to be told from it."""
 
@@ -108,7 +105,7 @@ def _but_for(scan: _core.Scan) -> str:
     values, errors = (np.array(of[first : last + 1]) for of in (scan.values, scan.stderr))
     apart = np.abs(values - values[0])
     parts = apart / np.abs(values[0])
-    beyond = parts[apart > _AGREE * np.minimum(errors, errors[0])]
+    beyond = parts[apart > _core.AGREE * np.minimum(errors, errors[0])]
     return f" but for {percent(float(beyond.max()))}, which standard errors hold" if beyond.size else ""
 
 

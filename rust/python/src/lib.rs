@@ -91,6 +91,9 @@ mod _core {
     /// Coherence of the noise of both channels from which on one is fed back into the other.
     #[pymodule_export]
     const CORRELATED_NOISE: f64 = tvident::noise::CORRELATED_NOISE;
+    /// Standard errors, the smaller of two, within which widths agree.
+    #[pymodule_export]
+    const AGREE: f64 = tvident::inference::AGREE;
     /// Widths that agree differ by this factor or more, or it may be chance.
     #[pymodule_export]
     const LEAST_PLATEAU: f64 = tvident::inference::LEAST_PLATEAU;

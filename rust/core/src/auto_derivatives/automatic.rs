@@ -7,14 +7,15 @@
 
 use std::num::NonZeroUsize;
 
+use crate::auto_derivatives::block_means::WHOLE;
 use crate::auto_derivatives::boundary;
 use crate::auto_derivatives::candidate_weights::Refinement;
 use crate::auto_derivatives::candidates::Target;
 use crate::auto_derivatives::global_choice::{Pair, SHORTEST, rounded};
 use crate::auto_derivatives::local_weights::DerivativeOutputs;
-use crate::auto_derivatives::survey::{self, CLOSELY, Survey};
+use crate::auto_derivatives::survey::{CLOSELY, LONGEST, Survey};
 use crate::auto_derivatives::trend::ParabolicTrend;
-use crate::auto_derivatives::whole_record::{LONGEST, WholeTarget};
+use crate::auto_derivatives::whole_record::WholeTarget;
 use crate::error::Error;
 use crate::exec::memory;
 use crate::exec::pool::Watch;
@@ -166,10 +167,10 @@ pub fn estimate_automatically(
     let trend = trend.as_ref().filter(|trend| highest >= trend.degree);
     // Of longer records there are many windows of any length: they must have found none too long, either.
     let best = match trend {
-        Some(_) if samples <= LONGEST => None,
+        Some(_) if samples <= WHOLE => None,
         _ => survey.best(&target, &mut || check_cancelled(watch, 0, total))?,
     };
-    let none_too_long = samples <= LONGEST || best.is_some_and(|pair| pair.half >= survey::LONGEST / 2);
+    let none_too_long = samples <= WHOLE || best.is_some_and(|pair| pair.half >= LONGEST / 2);
     if let Some(trend) = trend.filter(|_| none_too_long) {
         check_cancelled(watch, samples, total)?;
         let choice = of_trend(trend, &target, estimates);

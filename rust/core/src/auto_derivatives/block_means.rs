@@ -11,6 +11,9 @@ use crate::error::Error;
 use crate::exec::memory;
 use crate::record::samples::{Samples, is_usable};
 
+/// Longer records are looked at by means, and in stretches.
+pub(crate) const WHOLE: usize = 1 << 16;
+
 /// Samples of a mean of the next grid, over those of a mean of this one.
 pub(crate) const COARSER: usize = 3;
 
@@ -133,8 +136,12 @@ impl<'a> BlockMeans<'a> {
         self.record
     }
 
-    /// Samples of the longest means of at most so many.
-    pub(crate) fn coarsest(&self, most: usize) -> usize {
+    /// Samples of the longest means of which so many samples hold so many; one where the record is not long.
+    pub(crate) fn coarsest(&self, length: usize, least: usize) -> usize {
+        if self.record.len() <= WHOLE {
+            return 1;
+        }
+        let most = length / least;
         self.levels.iter().map(|level| level.grid.step).filter(|&step| step <= most).max().unwrap_or(1)
     }
 

@@ -9,7 +9,7 @@ use std::ops::Range;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use crate::auto_derivatives::block_means::{BlockMeans, COARSER, Grid, mean, step_at_end, step_for};
+use crate::auto_derivatives::block_means::{BlockMeans, COARSER, Grid, WHOLE, mean, step_at_end, step_for};
 use crate::auto_derivatives::candidates::Bank;
 use crate::error::Error;
 use crate::exec::memory;
@@ -21,8 +21,7 @@ use crate::simd::instructions::Instructions;
 /// Half-width of the longest window tried.
 pub(crate) const LONGEST: usize = 10_000;
 
-/// Longer records are subsampled in stretches.
-const WHOLE: usize = 1 << 16;
+/// Stretches of a long record.
 const STRETCHES: usize = 16;
 
 /// Samples from one place to the next in stretches: of windows of any length at least, and at most.

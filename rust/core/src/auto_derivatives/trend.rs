@@ -12,7 +12,7 @@
 //! A mean over all windows would not see what happens in one of them, so no window by itself may exceed chance either.
 
 use crate::auto_derivatives::block_means::BlockMeans;
-use crate::auto_derivatives::whole_record::{DEGREES, LONGEST, WholeRecord, WindowCoefficients};
+use crate::auto_derivatives::whole_record::{DEGREES, WholeRecord, WindowCoefficients};
 use crate::error::Error;
 use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::tables::basis;
@@ -82,7 +82,7 @@ impl ParabolicTrend {
         let shorter = std::iter::successors(Some(samples / SHORTER), |length| Some(length / SHORTER));
         // The shortest windows see the highest frequencies.
         for length in shorter.take_while(|&length| length > 2 * SHORTEST).chain([SHORTEST]) {
-            let step = if samples > LONGEST { means.coarsest(length / LEAST_MEANS) } else { 1 };
+            let step = means.coarsest(length, LEAST_MEANS);
             let windows = TestedWindows::new(means.of(step), length / step, step, noise, instructions)?;
             let test = NoiseAlone::new(noise, windows.count);
             let Some(found) = test.degree_from(degree, &windows.power) else { return Ok(None) };

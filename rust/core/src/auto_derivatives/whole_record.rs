@@ -31,8 +31,7 @@ use crate::simd::vectors::{Kernel, Lanes, dispatch};
 /// Degrees of the polynomials of a record.
 pub(crate) const DEGREES: usize = 16;
 
-/// Records of more samples are made of means, of which there are at least so many.
-pub(crate) const LONGEST: usize = 1 << 16;
+/// Long records are made of means, of which there are at least so many.
 const LEAST_MEANS: usize = 1 << 10;
 
 /// The highest order that is weighed, unless the derivative is higher.
@@ -85,7 +84,7 @@ impl WholeRecord {
     /// If there is not the memory.
     pub(crate) fn new(means: &BlockMeans<'_>, instructions: Instructions) -> Result<Self, Error> {
         let samples = means.record().len();
-        let step = if samples > LONGEST { means.coarsest(samples / LEAST_MEANS) } else { 1 };
+        let step = means.coarsest(samples, LEAST_MEANS);
         let grid = Grid::new(samples, step);
         memory::ask_for_numbers(grid.count)?;
         let mut values = vec![0.0; grid.count];

@@ -22,4 +22,4 @@ pub(crate) mod windows_around;
 
 pub use constancy::{NO_CHANCE, Test};
 pub use missing_terms::{CONSPICUOUS, Missing, Suspect};
-pub use scales::{AtScale, LEAST_PLATEAU, Plateau};
+pub use scales::{AGREE, AtScale, LEAST_PLATEAU, Plateau};

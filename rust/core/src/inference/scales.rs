@@ -11,7 +11,7 @@
 use crate::regression::block_fit::BlockFit;
 
 /// Estimates agree that differ by no more than so many standard errors, the smaller of the two.
-pub(crate) const AGREE: f64 = 2.0;
+pub const AGREE: f64 = 2.0;
 
 /// Estimates that differ by less than this part of them are alike, whatever their errors: no sensor's gain is known better.
 pub(crate) const ALIKE: f64 = 1e-3;
