@@ -28,7 +28,7 @@ demo: $(DEMO_BUILT)  ## identify a simulated recording, print what was found aga
 	$(DEMO)/$(PROGRAMS)/tvident demo
 
 .PHONY: test
-test:  ## every test but the longest; the last line says which tests had no recordings
+test:  ## every test but the slow and the longest; the last line says which tests had no recordings
 	# Packages are fetched while Rust compiles, and tests inside the core run while it is compiled as it is shipped.
 	$(MAKE) --no-print-directory --jobs=3 test-units test-crate $(READY)
 	$(MAKE) --no-print-directory test-python
@@ -65,12 +65,17 @@ test-python: $(BUILT)  ## tests of the Python package
 	# waits for a cluster, a browser or a stream. Whoever is done first takes over from the others.
 	$(BIN)/python -m pytest --quiet --numprocesses=3 --dist=worksteal $(addprefix --ignore=,$(TIMED))
 
+.PHONY: test-slow
+test-slow: $(BUILT)  ## tests of the Python package that take about a second or more each
+	TVIDENT_TESTS=slow $(BIN)/python -m pytest --quiet --numprocesses=3 --dist=worksteal
+
 .PHONY: test-long
-test-long: $(BUILT)  ## the longest tests: more seeds and cases of what `make test` tests by some
+test-long: $(BUILT)  ## the longest tests: more seeds and cases of what other tests do by some
 	TVIDENT_TESTS=long $(BIN)/python -m pytest --quiet --numprocesses=2 --dist=worksteal
 
 .PHONY: test-all
 test-all: lint test  ## every lint and every test there is but soaks and attacks
+	$(MAKE) --no-print-directory test-slow
 	$(MAKE) --no-print-directory test-long
 
 .PHONY: lint
@@ -167,7 +172,8 @@ clean:  ## remove everything that was made
 
 $(READY): requirements-development.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement requirements-development.txt
+	# Modules are compiled when they are imported: that is one of three, and half of the time that this takes.
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --requirement requirements-development.txt
 	@touch $@
 
 $(BUILT): $(READY) $(RUST) pyproject.toml

@@ -10,39 +10,44 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
-LONG = os.environ.get("TVIDENT_TESTS") == "long"
-"""Whether this is `make test-long`."""
+QUICK, SLOW, LONG = "quick", "slow", "long"
+"""What `make test`, `make test-slow` and `make test-long` run: each test is in one of these groups."""
+GROUP = os.environ.get("TVIDENT_TESTS", QUICK)
+"""The group whose tests are run."""
+if GROUP not in (QUICK, SLOW, LONG):
+    raise pytest.UsageError(f"TVIDENT_TESTS is {QUICK}, {SLOW} or {LONG}, not {GROUP!r}")
 
 # A slow machine is no failure; the seed is fixed, so that a green run stays green. `make soak` looks further.
 settings.register_profile("short", deadline=None, max_examples=25, derandomize=True, print_blob=True)
 settings.register_profile("long", deadline=None, max_examples=100, derandomize=True, print_blob=True)
 settings.register_profile("soak", deadline=None, max_examples=2000, print_blob=True)
-settings.load_profile(os.environ.get("TVIDENT_HYPOTHESIS", "long" if LONG else "short"))
+settings.load_profile(os.environ.get("TVIDENT_HYPOTHESIS", "long" if GROUP == LONG else "short"))
 
 
 NO_RECORDINGS, A_MISSING_RECORDING = "no recordings at", "the recording "
 """How tests that need one say why they are skipped."""
 
 
-def is_long(item: pytest.Item, cases: Counter[str]) -> bool:
-    """Tell whether `make test-long` runs this one: it is marked so, or comes after the first cases of its test, of which `cases` counts."""
+def group_of(item: pytest.Item, cases: Counter[str]) -> str:
+    """Give the group of a test: as it is marked, and long if it comes after the first cases of its test, of which `cases` counts."""
     if item.get_closest_marker("long") is not None:
-        return True
+        return LONG
     first = item.get_closest_marker("first")
-    if first is None:
-        return False
-    test = item.nodeid.partition("[")[0]
-    cases[test] += 1
-    return bool(cases[test] > first.args[0])
+    if first is not None:
+        test = item.nodeid.partition("[")[0]
+        cases[test] += 1
+        if cases[test] > first.args[0]:
+            return LONG
+    return QUICK if item.get_closest_marker("slow") is None else SLOW
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what takes long, or with `TVIDENT_TESTS=long` everything else: each test is run by one of the two, a property by both."""
+    """Leave out what is in another group. The longest have properties of all groups among them, with more examples."""
     parted: dict[bool, list[pytest.Item]] = {True: [], False: []}
     cases: Counter[str] = Counter()
     for one in items:
-        of_more_examples = LONG and getattr(getattr(one, "obj", None), "is_hypothesis_test", False)
-        parted[of_more_examples or is_long(one, cases) == LONG].append(one)
+        of_more_examples = GROUP == LONG and getattr(getattr(one, "obj", None), "is_hypothesis_test", False)
+        parted[of_more_examples or group_of(one, cases) == GROUP].append(one)
     items[:] = parted[True]
     config.hook.pytest_deselected(items=parted[False])
 

@@ -31,6 +31,7 @@ LONG = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scale", "kinds", "seed", "noise"),
     [(0.03, CONSTANT, 11, 1e-4), (1.0, {"stiffness": "constant"}, 2, 3e-3), (1.0, {}, 11, 1e-4), *LONG],

@@ -33,6 +33,7 @@ def found(seed: int, **kinds: Any) -> Any:
     return tvident.identify(rig.angle, rig.torque, sample_rate=RATE, **kinds)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, *long(0, 1, 3, 4, 5, 7, 8, 9, 11)])
 def test_a_growing_damping_is_no_late_torque(seed: int) -> None:
     advice = found(seed).advice
@@ -41,6 +42,7 @@ def test_a_growing_damping_is_no_late_torque(seed: int) -> None:
     assert "the error of inertia falls from " in advice[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, *long(0, 3, 8, 11)])
 def test_what_is_advised_is_right_and_believed(seed: int) -> None:
     rig, result = sweep(seed), found(seed, stiffness="constant")

@@ -93,6 +93,7 @@ def test_what_rests_is_told_to_be_left_out() -> None:
     assert "\nno window holds enough equations" in advice(missing)
 
 
+@pytest.mark.slow
 def test_a_term_that_looks_like_another_is_told() -> None:
     # Within 0.05 s the motion mostly keeps its direction, so friction looks like an offset.
     found = advice(paper(RIG.angle, RIG.torque, stiffness=0, regression_window=50, terms=["coulomb", "offset"]))
@@ -126,6 +127,7 @@ def test_a_torque_that_is_mostly_zero_is_no_error() -> None:
     assert "inf" not in " ".join(result.advice) + result.summary()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", [200_000, *long(1_000_000)])
 def test_a_second_in_a_quarter_of_an_hour_is_told_of(samples: int) -> None:
     rig = tvident.simulate_torsional_rig(1.0)
@@ -149,6 +151,7 @@ def test_advice_is_on_what_the_mask_leaves(step: int) -> None:
     assert not any("mask=" in one for one in result.advice)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("change", "words"),
@@ -200,6 +203,7 @@ def test_swapped_channels_are_asked_about_where_exchanging_them_explains_the_rec
         assert "swapped" not in advice(right)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", range(17060, 17064))
 def test_a_slow_machine_with_swapped_channels_is_not_told_of_a_lag(seed: int) -> None:

@@ -87,6 +87,7 @@ def test_a_discrete_model_has_the_parameters_of_the_rig() -> None:
     assert np.all(wrong < 1e-3)
 
 
+@pytest.mark.slow
 def test_methods_are_compared(tmp_path: Path) -> None:
     rig = tvident.simulate_torsional_rig(duration=6.0, pattern="square", seed=3)
     truth = {name: getattr(rig, name) for name in ("inertia", "damping", "stiffness")}

@@ -81,6 +81,7 @@ def test_samples_lost_at_regular_places_are_no_digits(every: int) -> None:
     assert spread < 0.01 * np.std(expected.derivatives[1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [998.0, 960.0, 990.0])
 @pytest.mark.parametrize("noise", [0.0, 1e-5, 1e-2])
 def test_digits_of_an_even_clock_are_no_lost_samples(rate: float, noise: float) -> None:

@@ -46,6 +46,7 @@ def test_a_period_that_cannot_be_is_refused(tmp_path: Path, period: str) -> None
     assert "--period must be a number above zero, or a multiple of pi such as 2pi" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_velocity_beside_the_angle_or_in_its_place(tmp_path: Path) -> None:
     rig = tvident.simulate_torsional_rig(duration=4, sample_rate=500, seed=2)
     velocity = rig.true_velocity + 0.01 * np.random.default_rng(0).standard_normal(rig.angle.size)

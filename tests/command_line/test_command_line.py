@@ -76,6 +76,7 @@ def test_results_are_the_librarys_with_names_and_units(recording: Path, tmp_path
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_derivatives_of_a_channel(recording: Path, tmp_path: Path) -> None:
     output, picture = tmp_path / "d.csv", tmp_path / "d.svg"
     done = run(
@@ -136,6 +137,7 @@ def test_known_parameters_may_be_channels_and_kinds_may_be_given(recording: Path
     assert abs(float(inertia.split()[2]) / 0.0123 - 1) < 0.01
 
 
+@pytest.mark.slow
 def test_every_setting_has_an_option_and_may_be_kept_in_a_file(recording: Path, tmp_path: Path) -> None:
     channels = recordings.read(recording)
     angle, torque = channels["angle [rad]"], channels["torque [N m]"]
@@ -214,6 +216,7 @@ def test_every_setting_has_an_option_and_may_be_kept_in_a_file(recording: Path, 
     np.testing.assert_array_equal(found["inertia [kg m^2]"], smoothed.inertia)
 
 
+@pytest.mark.slow
 def test_lag_quantisation_and_missing_values_have_options(tmp_path: Path) -> None:
     rig = tvident.simulate_torsional_rig(duration=10, encoder_counts=4096)
     angle, torque = rig.angle[2:].copy(), rig.torque[:-2]  # the torque comes two samples late

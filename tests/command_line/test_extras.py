@@ -7,12 +7,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import tvident
 
 TVIDENT = str(Path(sys.executable).with_name("tvident"))
 IDENTIFY = ("identify", "rig.csv", "--angle", "angle", "--torque", "torque", "--sample-rate", "1000")
 
 
+@pytest.mark.slow
 def test_without_matplotlib_all_but_pictures_is_there(tmp_path: Path) -> None:
     tvident.simulate_torsional_rig(5.0, seed=3).save(tmp_path / "rig.csv")
     # A module of that name that cannot be imported stands for one that is not installed.
@@ -42,6 +45,7 @@ def test_without_matplotlib_all_but_pictures_is_there(tmp_path: Path) -> None:
     }
 
 
+@pytest.mark.slow
 def test_without_what_the_command_is_made_with_the_library_is_there(tmp_path: Path) -> None:
     for name in ("click", "tqdm"):
         (tmp_path / f"{name}.py").write_text("raise ImportError")

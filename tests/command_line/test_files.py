@@ -26,6 +26,7 @@ def constant(output: str, name: str) -> float:
     return float(output.rsplit(f"\n{name} = ", 1)[1].split(maxsplit=1)[0])
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of the library that writes bags
 def test_a_joint_of_a_bag_is_all_that_is_named(tmp_path: Path) -> None:
     recorded_files.mcap(tmp_path / "run.mcap", RIG.time, RIG.angle, RIG.torque)
@@ -42,6 +43,7 @@ def test_a_joint_of_a_bag_is_all_that_is_named(tmp_path: Path) -> None:
     assert "Missing option '--torque'" in neither.output
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 @pytest.mark.parametrize("write", [recorded_files.mcap, recorded_files.bag])
@@ -64,6 +66,7 @@ def test_the_velocity_of_a_joint_is_used_where_something_measured_it(
         assert constant(done.output, "inertia") == pytest.approx(constants["inertia"][0], rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_stamps_that_scatter_are_evened_out_and_said(tmp_path: Path) -> None:
     generator = np.random.default_rng(0)

@@ -137,6 +137,7 @@ def test_capitals_do_not_matter_where_they_tell_nothing_apart() -> None:
     assert "must have one channel 'ANGLE'; it has Angle, angle; name one of these" in both.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_a_member_of_a_structure_is_found_by_the_name_that_it_is_listed_with() -> None:
     call = "identify run.mat --angle angle_deg --torque torque_Nmm --time t --stiffness constant"
@@ -195,6 +196,7 @@ def bare(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("bare")
 @pytest.mark.parametrize("command", ["identify", "report"])
 def test_units_that_nobody_said_are_told(command: str) -> None:

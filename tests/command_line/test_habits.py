@@ -136,6 +136,7 @@ def test_what_goes_wrong_is_json_too(folder: Path) -> None:
         assert said["error"] in done.stderr
 
 
+@pytest.mark.slow
 def test_a_run_is_repeated_from_its_result_and_from_toml(folder: Path) -> None:
     options = ["--inertia", "0.0123", "--term", "coulomb", "--window-length", "41"]
     assert run(*IDENTIFY, *options, "-o", "first.npz").returncode == 0
@@ -266,6 +267,7 @@ def test_derivatives_without_a_channel_list_what_there_is(folder: Path) -> None:
     assert "Missing option '--channel'; times.csv has time; name the channel" in times.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_the_demo_says_at_once_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys.modules["tvident._commands.demo"], "find_spec", lambda _: None)

@@ -197,6 +197,7 @@ def test_a_pipe_is_written_to_and_stays_a_pipe(folder: Path) -> None:
 
 
 # No device that others need is named here: a test that fails would cost the machine its /dev/null.
+@pytest.mark.slow
 def test_devices_and_streams_of_the_process_are_written_to(folder: Path) -> None:
     parent, child = pty.openpty()
     device = os.ttyname(child)
@@ -219,6 +220,7 @@ def test_devices_and_streams_of_the_process_are_written_to(folder: Path) -> None
     assert "/proc/self/fd/1: No space left on device" in full.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("redirected", "status", "said"),
     [
@@ -239,6 +241,7 @@ def test_streams_that_are_closed_or_full(folder: Path, redirected: str, status: 
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["old.csv", "old.npz", "old.png", "old.json"])
 def test_a_full_disk_leaves_the_old_file(folder: Path, name: str) -> None:
     def fill() -> None:
@@ -347,6 +350,7 @@ def test_no_name_speaks_to_the_terminal(
     assert "Traceback" not in said
 
 
+@pytest.mark.slow
 def test_names_of_channels_are_no_names_of_files_and_no_formulas(folder: Path) -> None:
     channels = recordings.read(folder / "rig.csv")
     names = ("a$b_{$" + "x" * 300, "t" * 300)
@@ -389,6 +393,7 @@ def test_settings_that_are_none(folder: Path, content: str, message: str) -> Non
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", [".json", ".toml", ".csv", ".npz"])
 def test_settings_are_not_waited_for_at_a_pipe(folder: Path, ending: str) -> None:
     pipe = folder / f"pipe_of_settings{ending}"

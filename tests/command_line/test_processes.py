@@ -35,6 +35,7 @@ def test_memory_that_runs_out_is_one_line(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_had_enough_is_no_error(tmp_path: Path) -> None:
     tvident.simulate_torsional_rig(5.0, seed=3).save(tmp_path / "rig.csv")
     command = [TVIDENT, "identify", str(tmp_path / "rig.csv"), *GOOD, "-o", "-"]
@@ -56,6 +57,7 @@ def long_recording(folder: Path, samples: int) -> None:
     np.save(folder / "t.npy", sum((13 - 0.0123 * w**2) * wave for wave, w in waves) + 0.1 * noise[1])
 
 
+@pytest.mark.slow
 def test_progress_is_shown_on_a_terminal_and_not_in_a_pipe(tmp_path: Path) -> None:
     long_recording(tmp_path, 150_000)
     command = [TVIDENT, "identify", "--angle", "a.npy", "--torque", "t.npy", "--sample-rate", "1000"]
@@ -115,6 +117,7 @@ def test_an_interrupt_where_nothing_can_be_raised_is_heard(tmp_path: Path) -> No
     is_aborted(tmp_path, body, 19)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "module",
     [

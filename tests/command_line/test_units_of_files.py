@@ -80,6 +80,7 @@ def test_the_unit_of_a_channel_that_is_multiplied_is_kept_or_asked_for(tmp_path:
     assert f"{expected:.3g}" in compared.stdout
 
 
+@pytest.mark.slow
 def test_methods_are_compared_in_the_units_of_a_truth(tmp_path: Path) -> None:
     """Beside degrees every method was 98 % off, and so is a rate of times in ms."""
     columns = [1e3 * RIG.time, np.rad2deg(RIG.angle), RIG.torque, RIG.inertia, RIG.damping, RIG.stiffness]

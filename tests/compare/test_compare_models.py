@@ -58,6 +58,7 @@ def test_the_equation_is_found_and_no_other_term_is_believed(records: int, most:
     assert sum(float(one.averaged["cubic"][0]) > 3 * float(one.averaged["cubic"][1]) for one in chosen) <= 2
 
 
+@pytest.mark.slow
 def test_terms_with_inner_parameters_are_searched_and_pay_for_them() -> None:
     generator = np.random.default_rng(5)
     t = np.arange(2500) / 500
@@ -145,6 +146,7 @@ def test_overlapping_rows_are_worth_so_many_independent_ones() -> None:
     assert 2 / scatter == pytest.approx(effective_observations(3960, 41, 8), rel=0.2)
 
 
+@pytest.mark.slow
 def test_default_candidates_windowed_stiffness_and_words(tmp_path: Path) -> None:
     rig = tvident.simulate_torsional_rig(duration=3.0, seed=2)
     compared = tvident.compare_models(rig.angle, rig.torque, sample_rate=1000)

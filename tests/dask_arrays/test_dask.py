@@ -107,6 +107,7 @@ def test_two_processes_have_the_bits_of_one_call(rig: tvident.Recording, client:
     assert_same_bits(found, tvident.identify(rig.angle, rig.torque, sample_rate=1000, method="paper"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("terms", [*long(((),)), ("offset", "coulomb")])
 def test_shared_parameters_are_those_of_one_call(
     rig: tvident.Recording, client: Client, terms: tuple[str, ...]
@@ -129,6 +130,7 @@ def test_shared_parameters_are_those_of_one_call(
     assert found.record_status == whole.record_status
 
 
+@pytest.mark.slow
 def test_the_weak_form_finds_what_one_call_finds(rig: tvident.Recording, client: Client) -> None:
     del client
     whole = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
@@ -143,6 +145,7 @@ def test_the_weak_form_finds_what_one_call_finds(rig: tvident.Recording, client:
     assert found.record_status == whole.record_status
 
 
+@pytest.mark.slow
 def test_weights_count_in_every_block(rig: tvident.Recording) -> None:
     samples = 20_000
     weights = np.where(np.arange(samples) < 8000, 1.0, 0.01)
@@ -169,6 +172,7 @@ def test_a_batch_is_many_records(rig: tvident.Recording) -> None:
         assert np.array_equal(found.stiffness[record].compute(), whole.stiffness, equal_nan=True)
 
 
+@pytest.mark.slow
 def test_missing_samples_leave_other_blocks_as_they_are(rig: tvident.Recording) -> None:
     torque = np.array(rig.torque)
     torque[30_000:30_040] = np.nan
@@ -180,6 +184,7 @@ def test_missing_samples_leave_other_blocks_as_they_are(rig: tvident.Recording) 
     assert (found.status[30_000:30_040].compute() & Status.GAP != 0).all()
 
 
+@pytest.mark.slow
 def test_a_killed_worker_costs_time_and_no_results(rig: tvident.Recording, client: Client) -> None:
     angle, torque = (chunked(one, 6_000) for one in (rig.angle, rig.torque))
     found = tvident.dask.identify(angle, torque, sample_rate=1000, method="paper").stiffness

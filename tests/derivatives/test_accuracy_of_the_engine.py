@@ -71,6 +71,7 @@ def window(y: Array, centre: int, half: int = HALF, highest: int = 15) -> tuple[
     return exact(samples.tobytes(), highest), float(np.linalg.norm(samples - samples[half]))
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("kind", ["drift", "offset"])
 def test_coefficients_of_every_order_keep_their_digits(kind: str) -> None:
@@ -134,6 +135,7 @@ def test_an_offset_costs_the_acceleration_nothing() -> None:
             )
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("half", [25, 100, 1000])
 def test_residuals_keep_their_digits_where_noise_is_a_millionth(half: int) -> None:
@@ -148,6 +150,7 @@ def test_residuals_keep_their_digits_where_noise_is_a_millionth(half: int) -> No
             assert abs(found - expected) <= RESIDUALS * expected, f"{part}, sample {i}: {found / expected - 1}"
 
 
+@pytest.mark.slow
 def test_the_last_minute_is_as_accurate_as_the_first() -> None:
     """Rounding is chance; over 120 windows its root mean square is the same within a third, were there no drift."""
     y = record("drift")

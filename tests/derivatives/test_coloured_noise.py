@@ -79,6 +79,7 @@ def beside_the_best_filter(truth: list[Array], noises: list[Array]) -> tuple[lis
     return ratios, covered
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("colour", ["0.5", "0.8", *long("0.9"), "1/f"])
 @pytest.mark.parametrize("kind", ["sine", *long("several sines"), "constant", "line"])

@@ -272,6 +272,7 @@ def test_every_instruction_set_gives_the_same_numbers() -> None:
         _core.force_instructions(None)
 
 
+@pytest.mark.slow
 def test_other_python_threads_run_meanwhile() -> None:
     y = np.random.default_rng(0).standard_normal(4_000_000)
     ticks, stop = [], threading.Event()

@@ -165,6 +165,7 @@ def test_weights_say_how_much_samples_count() -> None:
     np.testing.assert_allclose(weighted.derivatives[:, 680:720], omitted.derivatives[:, 680:720], rtol=1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(5))
 @given(seed=st.integers(0, 10_000), missing=st.sampled_from([(0.01, 1), (0.05, 1), (0.3, 1), (0.05, 8)]))
 def test_windows_are_chosen_as_if_nothing_were_missing(seed: int, missing: tuple[float, int]) -> None:
@@ -212,6 +213,7 @@ def test_windows_that_lack_samples_have_orders_of_their_own_beside_others(select
         assert np.array_equal(getattr(found, name)[..., lack], getattr(own, name)[..., lack]), name
 
 
+@pytest.mark.slow
 def test_hubers_loss_leaves_out_what_is_missing() -> None:
     generator = np.random.default_rng(6)
     y = np.sin(np.arange(120) / 9) + 0.05 * generator.standard_normal(120)

@@ -189,6 +189,7 @@ def test_the_command_line_reference_is_what_the_commands_say() -> None:
     assert page == script("command_line_reference").reference(), "run `make docs`"
 
 
+@pytest.mark.slow
 def test_the_readmes_first_table_is_measured() -> None:
     shown = table(ROOT / "README.md", "How *K*(t) is found")
     measured = [line.strip("| ").split(" | ") for line in script("comparison").table().splitlines()[2:]]
@@ -198,6 +199,7 @@ def test_the_readmes_first_table_is_measured() -> None:
             assert float(cell.rstrip("% ")) == pytest.approx(float(number.rstrip("% ")), rel=MEASURED)
 
 
+@pytest.mark.slow
 def test_the_splines_beside_the_readmes_table_are_measured() -> None:
     shown = table(ROOT / "docs" / "compared.md", "window")
     measured = [line.strip("| ").split(" | ") for line in script("comparison").table_of_splines().splitlines()[2:]]
@@ -266,6 +268,7 @@ def call(text: str) -> dict[str, Any]:
     return dict(eval(f"dict({text.strip('`')})"))  # noqa: S307 - written by us
 
 
+@pytest.mark.slow
 def test_settings_have_the_errors_that_are_stated() -> None:
     rows = table(ROOT / "docs" / "settings.md", "`identify(…)`")
     for column in list(rows[0])[1:]:

@@ -49,6 +49,7 @@ def test_derivatives(tmp_path: Path) -> None:
     assert plain > 100
 
 
+@pytest.mark.slow
 def test_torsional_rig(tmp_path: Path) -> None:
     printed = run("torsional_rig.py", tmp_path)
     (default,), (paper,), (known,) = (
@@ -69,6 +70,7 @@ def test_friction(tmp_path: Path) -> None:
         assert abs(value - truth) < 4 * error + 1e-4
 
 
+@pytest.mark.slow
 def test_reflex(tmp_path: Path) -> None:
     printed = run("reflex.py", tmp_path)
     for name in ("inertia", "damping", "stiffness", "reflex", "reflex.delay", "reflex.corner"):
@@ -85,6 +87,7 @@ def test_own_file(tmp_path: Path) -> None:
     assert (tmp_path / "identified.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_from_the_shell(tmp_path: Path) -> None:
     printed = run("from_the_shell.sh", tmp_path)
     assert "uniform: 1000 per unit" in printed

@@ -71,6 +71,7 @@ def test_a_missing_pendulum_is_suspected_or_the_noise_model_fails() -> None:
     assert result.record_status & (tvident.Status.NOISE_MODEL | tvident.Status.TERM_SUSPECTED)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("method", ["auto", tvident.StrongForm(window_length=101)])
 @pytest.mark.parametrize("given", [{}, {"stiffness": "constant"}])

@@ -9,6 +9,7 @@ from reference.efficient import efficient_stiffness
 from tvident import Expansion
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [16006, *long(16017, 16000, 16001, 16005, 16014)])
 def test_a_stiffness_over_the_slider_has_the_error_of_the_efficient_estimator(seed: int) -> None:
     # The torque's noise alone moves the whole curve by 0.085 % (standard deviation). In the first two that is 0.155 and 0.163 %, and

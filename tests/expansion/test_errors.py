@@ -38,6 +38,7 @@ def test_errors_of_a_curve_do_not_depend_on_which_functions_span_it(size: int) -
         assert found.constants[name][1] == pytest.approx(expected.constants[name][1], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_errors_that_follow_from_residuals_do_not_either() -> None:
     # Half of a torque that no term explains: the covariance follows from what is left.
     rig = tvident.simulate_torsional_rig(duration=6.0, seed=3, angle_noise=1e-3)

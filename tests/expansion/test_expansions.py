@@ -38,6 +38,7 @@ def error(result: tvident.Identification, rig: tvident.Recording) -> float:
     return float(np.sqrt(np.mean((result.stiffness - rig.stiffness) ** 2)) / rig.stiffness.mean())
 
 
+@pytest.mark.slow
 def test_stiffness_over_the_slider(rig: tvident.Recording) -> None:
     result = identify(rig, stiffness=Expansion("bspline", of=rig.slider_position))
     # Seeds 0 to 19: median 0.07 %; windows 0.2 to 0.5 %.
@@ -115,6 +116,7 @@ def test_functions_of_ones_own(short: tvident.Recording) -> None:
         identify(short, stiffness=Expansion(lambda x, size: x * size, of=short.slider_position))
 
 
+@pytest.mark.slow
 def test_damping_and_inertia_that_change() -> None:
     rig = tvident.simulate_torsional_rig(
         duration=12.0,
@@ -175,6 +177,7 @@ def test_damping_over_a_recorded_voltage(seed: int) -> None:
     assert found.settings["kinds"]["damping"] == "expanded"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, *long(2, 3)])
 def test_inertia_over_a_recorded_position(seed: int) -> None:
     def position(t: Any) -> Any:
@@ -294,6 +297,7 @@ def test_errors_know_that_another_size_might_have_been_taken() -> None:
     np.testing.assert_allclose(curve.stderr_at(short.time), chosen.stderr["stiffness"], rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seeds", [range(16100, 16101), *long(range(16101, 16110))])
 def test_a_curve_of_time_is_nearly_as_good_as_the_best_size(seeds: range) -> None:
     # Ten seeds: 1.09; the size that is taken alone has 1.17.
@@ -314,6 +318,7 @@ def test_a_curve_of_time_is_nearly_as_good_as_the_best_size(seeds: range) -> Non
     assert np.mean(ratios) < 1.1 + 0.3 / len(ratios)
 
 
+@pytest.mark.slow
 def test_a_schedule_and_a_size_that_is_given_are_one_curve(short: tvident.Recording) -> None:
     for one in (Expansion("legendre", of=short.slider_position), Expansion("legendre", size=12)):
         curve = identify(short, stiffness=one).expansions["stiffness"]
@@ -321,6 +326,7 @@ def test_a_schedule_and_a_size_that_is_given_are_one_curve(short: tvident.Record
         np.testing.assert_allclose(np.polynomial.legendre.legval(x, curve.coefficients), curve.value, rtol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("family", "duration", "seed", "largest", "enough"),
     [
@@ -365,6 +371,7 @@ def delayed_stretch(time: Array, angle: Array, velocity: Array, delay: float) ->
     return np.maximum(np.interp(time - delay, time, velocity), 0.0)
 
 
+@pytest.mark.slow
 def test_a_rectified_reflex_has_a_gain_that_is_scheduled_and_a_delay_that_is_searched() -> None:
     generator, t = np.random.default_rng(5), np.arange(6000) * 1e-3
     waves = [(0.3, w, phase) for phase, w in enumerate((5.0, 9.0, 23.0, 41.0, 60.0))]
@@ -396,6 +403,7 @@ def test_a_rectified_reflex_has_a_gain_that_is_scheduled_and_a_delay_that_is_sea
     assert "reflex.delay  searched" in result.summary()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, *long(2, 3)])
 def test_a_jump_that_functions_of_time_do_not_follow_is_said(seed: int) -> None:
     square = tvident.simulate_torsional_rig(duration=8.0, seed=seed, pattern="square")
@@ -404,6 +412,7 @@ def test_a_jump_that_functions_of_time_do_not_follow_is_said(seed: int) -> None:
     assert any("windows find a jump of stiffness (at 4" in line and "do not follow" in line for line in result.advice)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("last", "seed"), [(0.15, 2), (0.3, 1), *long((0.15, 1), (0.2, 1), (0.2, 2), (0.3, 2))])
 def test_a_jump_near_the_end_is_said(last: float, seed: int) -> None:
@@ -414,6 +423,7 @@ def test_a_jump_near_the_end_is_said(last: float, seed: int) -> None:
     assert any("jump" in line or "do not follow" in line for line in result.advice)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("pattern", "seed"),

@@ -63,6 +63,7 @@ def test_equations_are_second_differences_of_the_curve() -> None:
     np.testing.assert_allclose(unseen.rows(basis, Bend(0.5, 9.0)) @ factors, expected, rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seeds", [range(1), *long(range(300, 306))])
 @pytest.mark.parametrize("family", ["bspline", "chebyshev"])

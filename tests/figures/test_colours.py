@@ -120,6 +120,7 @@ def colours_of(panel: Any) -> set[str]:
     return {to_hex(np.clip(face[3] * np.array(face[:3]) + 1 - face[3], 0, 1)) for face in map(np.asarray, drawn)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("eyes", list(EYES))
 def test_series_of_a_panel_are_told_apart(pictures: dict[str, Any], eyes: str) -> None:
     several = 0

@@ -153,6 +153,7 @@ def test_a_file_is_drawn_with_its_units(rig: tvident.Recording) -> None:
         figures.plot_recording({"angle": rig.angle})
 
 
+@pytest.mark.slow
 def test_every_picture_draws_on_axes_of_ones_own(
     rig: tvident.Recording, result: tvident.Identification, paper: tvident.Identification
 ) -> None:

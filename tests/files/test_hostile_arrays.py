@@ -130,6 +130,7 @@ def test_npz_that_nobody_unpacks(tmp_path: Path, change: str) -> None:
     assert "must be an archive as numpy.savez writes it" in refusal(tmp_path / "x.npz")
 
 
+@pytest.mark.slow
 def test_an_archive_that_unpacks_to_much_more_than_it_is_is_refused_at_once(tmp_path: Path) -> None:
     with (
         zipfile.ZipFile(tmp_path / "x.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as made,
@@ -196,6 +197,7 @@ def test_damaged_matlab_files_cost_no_more_than_themselves(tmp_path: Path, seed:
     read_or_refused(tmp_path / "x.mat")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("what", "said"),
     [

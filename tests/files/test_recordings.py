@@ -62,6 +62,7 @@ def test_numpy_files(tmp_path: Path) -> None:
     assert_holds(tmp_path / "table.npy", {"a": [1, 3], "b": [2, 4]})
 
 
+@pytest.mark.slow
 def test_matlab_files_with_structures(tmp_path: Path) -> None:
     x = np.arange(5.0)
     io.savemat(tmp_path / "m.mat", {"angle": x[:, None], "fs": 1000.0, "rig": {"torque": x, "note": "text"}})

@@ -164,6 +164,7 @@ CELLS = st.one_of(
 
 
 # What hypothesis draws.
+@pytest.mark.slow
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.lists(st.lists(CELLS, min_size=3, max_size=3), min_size=2, max_size=12),
@@ -203,6 +204,7 @@ def test_numbers_are_those_that_were_written_or_refused(
     np.testing.assert_array_equal(found, rows)
 
 
+@pytest.mark.slow
 def test_long_texts_are_read_in_pieces_whose_seams_nobody_sees(tmp_path: Path) -> None:
     generator = np.random.default_rng(0)
     expected = generator.standard_normal((400_000, 2))
@@ -228,6 +230,7 @@ def test_a_file_of_nothing_but_a_hole_is_refused_at_once(tmp_path: Path) -> None
         recordings.read(path)
 
 
+@pytest.mark.slow
 def test_thousands_of_cells_of_which_no_two_lines_have_as_many_are_refused_soon(tmp_path: Path) -> None:
     content = "\n".join(",".join(["1"] * (7_000 + 37 * line)) for line in range(60))
     started = time.process_time()

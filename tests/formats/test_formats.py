@@ -148,6 +148,7 @@ def test_matlab_structures_are_channels_with_units(tmp_path: Path) -> None:
     assert found["torque"] is found["rig.torque"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_across", [False, True])
 def test_columns_of_a_matrix_are_called_as_the_list_beside_it_says(tmp_path: Path, is_across: bool) -> None:
     """They were data.0, data.1 and data.2, without a word of the list and of its units."""

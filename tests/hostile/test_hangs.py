@@ -3,6 +3,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
+
 from hostile import attack
 
 _INTERRUPTED_IN_NUMPY = """
@@ -19,6 +21,7 @@ assert tvident.savgol_filter([0.0, 1.0, 2.0, 3.0, 4.0], 5, 1).tolist() == [0.0, 
 """
 
 
+@pytest.mark.slow
 def test_what_nobody_can_mean_ends_at_once() -> None:
     attack.run("hostile.hangs", cases=6, share=0.1)
 

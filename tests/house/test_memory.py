@@ -56,14 +56,17 @@ def risen_by(name: str, samples: int, window: int, workers: int) -> int:
     return int(finished.stdout)
 
 
+@pytest.mark.slow
 def test_an_hour_fits_into_400_mib_with_all_its_results() -> None:
     assert risen_by("the paper's method", HOUR, 201, workers=2) < HELD_FOR_AN_HOUR
 
 
+@pytest.mark.slow
 def test_the_automatic_method_needs_little_beside_inputs_and_results() -> None:
     assert risen_by("the automatic method", HOUR, 0, workers=1) < (OF_RESULTS + BESIDE_RESULTS) * HOUR
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("window", "workers"), [(3000, 2), (LONGEST, 1), *long((201, 1), (201, 2), (3000, 1), (LONGEST, 2))]
 )

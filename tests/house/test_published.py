@@ -30,7 +30,7 @@ def test_every_system_runs_what_depends_on_it() -> None:
     text = (ROOT / ".github" / "workflows" / "check.yml").read_text(encoding="utf-8")
     jobs = dict(re.findall(r"^  ([a-z]+):\n(.*?)(?=^  [a-z]+:\n|\Z)", text, re.MULTILINE | re.DOTALL))
     for job, called in (
-        ("tests", {"lint-rust", "test-rust", "lint-core", "test-python", "test-long"}),
+        ("tests", {"lint-rust", "test-rust", "lint-core", "test-python", "test-slow", "test-long"}),
         ("wheels", {"wheels"}),
     ):
         assert {"macos-14", "windows-2022"} <= set(re.findall(r"[a-z]+-\d[\w.-]*", jobs[job]))

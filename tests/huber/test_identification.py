@@ -35,6 +35,7 @@ def errors(result: tvident.Identification, rig: tvident.TorsionalRecording) -> t
     return inertia, stiffness
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "size"), [*long((1, 5.0)), (2, 100.0)])
 def test_spikes_of_the_torque_move_parameters_by_little(seed: int, size: float) -> None:
     rig = tvident.simulate_torsional_rig(8.0, seed=seed)

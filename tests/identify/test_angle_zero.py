@@ -63,6 +63,7 @@ def test_the_spring_is_relaxed_at_another_angle(zero: float) -> None:
         assert not result.record_status & (Status.KIND_CONTRADICTED | Status.NOISE_MODEL | Status.SCALES_DISAGREE)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_few_rows_of_many_lead_to_the_same_zero(seed: int) -> None:
@@ -96,6 +97,7 @@ def test_the_size_of_the_zero_changes_nothing_else() -> None:
     assert np.allclose(small.stiffness, large.stiffness, rtol=0, atol=0.02 * np.nanmax(small.stderr["stiffness"]))
 
 
+@pytest.mark.slow
 def test_words_table_and_settings_tell_of_it() -> None:
     result = identified(1, 0.5)
     assert any("the spring is relaxed at" in reason for reason in result.reasons)
@@ -130,6 +132,7 @@ def test_a_batch_has_one_zero_a_record() -> None:
     assert result[1].settings["angle_zero"] == values[1]
 
 
+@pytest.mark.slow
 def test_it_is_found_beside_jumps_of_the_stiffness() -> None:
     for seed in (0, 1):
         result = identified(seed, -0.5, "square")
@@ -138,6 +141,7 @@ def test_it_is_found_beside_jumps_of_the_stiffness() -> None:
         assert len(result.jumps) == 4
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("pattern", ["slider", "constant"])
 def test_it_is_not_found_where_it_is_not(pattern: Pattern) -> None:
@@ -156,6 +160,7 @@ def test_beside_a_constant_stiffness_it_is_the_offset() -> None:
     assert result.terms["offset"][0] == pytest.approx(-0.5 * record.angle.std() * record.stiffness[0], rel=0.02)
 
 
+@pytest.mark.slow
 def test_an_offset_that_drifts_is_no_zero_and_is_named() -> None:
     record = rig(0)
     drift = 0.3 * record.torque.std() * np.cos(np.pi * record.time / record.time[-1])

@@ -48,6 +48,7 @@ class Record:
         return {"inertia": rig.inertia[0], "damping": rig.damping[0], "stiffness": rig.stiffness[0]}
 
 
+@pytest.mark.slow
 def test_a_gyroscope_beside_a_noisy_angle_makes_errors_smaller_and_they_hold() -> None:
     z: dict[str, list[float]] = {"parameters": [], "biases": []}
     inside, smaller = [], []
@@ -71,6 +72,7 @@ def test_a_gyroscope_beside_a_noisy_angle_makes_errors_smaller_and_they_hold() -
     assert np.median(smaller) < 0.7
 
 
+@pytest.mark.slow
 def test_a_velocity_without_an_angle_tells_the_same() -> None:
     z, biases = [], []
     for seed in range(8):
@@ -138,6 +140,7 @@ def test_strong_form_takes_derivatives_from_what_measured_them() -> None:
     assert abs(found.constants["inertia"][0] - truth) < 0.2 * abs(plain.constants["inertia"][0] - truth)
 
 
+@pytest.mark.slow
 def test_batches_and_gaps() -> None:
     records = [Record(seed, angle=0.05) for seed in (1, 2)]
     velocities = np.stack([record.velocity(0.01) for record in records])

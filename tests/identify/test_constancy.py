@@ -106,6 +106,7 @@ and 3.4 % and 0.99, 0.99 and 0.89 measured. They were 4.4, 2.8 and 6.0 %, and 0.
 constant stiffness."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["bump", *long("sine", "narrow bump")])
 def test_a_damping_that_bends_beside_a_constant_stiffness_is_within_its_errors(shape: str) -> None:
     change, wrong, least = CURVES[shape]
@@ -120,6 +121,7 @@ def test_a_damping_that_bends_beside_a_constant_stiffness_is_within_its_errors(s
     assert np.mean(covered) > least
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, *long(1, 2)])
 def test_what_grows_beside_a_stiffness_that_jumps_is_followed(seed: int) -> None:
     stiffness = STIFFNESS * (1 + 0.2 * np.sign(np.sin(2 * np.pi * TIME / 8 + 0.3)))
@@ -135,6 +137,7 @@ def jumping(seed: int) -> tvident.Identification:
     return tvident.identify(*recording(seed, inertia=truth), sample_rate=RATE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, *long(1)])
 def test_a_jump_of_inertia_is_one_of_inertia(seed: int) -> None:
     truth = np.where(TIME < 9.3, INERTIA, INERTIA * 1.2)

@@ -53,6 +53,7 @@ def off(result: tvident.Identification, recording: tvident.Recording) -> float:
     return float(np.sqrt(np.nanmean(wrong**2) / np.mean(recording.stiffness**2)))
 
 
+@pytest.mark.slow
 @pytest.mark.first(2)
 @pytest.mark.parametrize(("share", "frequency"), [(0.3, 0.05), (0.3, 0.5), (0.05, 0.05), (0.3, 0.0)])
 @pytest.mark.parametrize("pattern", ["slider", "constant"])
@@ -82,6 +83,7 @@ def test_an_offset_that_does_not_drift_is_constant(excitation: Excitation, patte
     assert found.value("offset") == given.value("offset")
 
 
+@pytest.mark.slow
 def test_a_constant_offset_can_be_asked_for() -> None:
     recording = rig("random", "slider")
     result = identified(recording, drift(recording, 0.3, 0.05), terms=[("offset", "constant")])
@@ -101,6 +103,7 @@ def test_a_repeated_call_has_the_same_offset(share: float) -> None:
     np.testing.assert_array_equal(again.terms["offset"], first.terms["offset"])
 
 
+@pytest.mark.slow
 def test_records_of_a_batch_decide_for_themselves() -> None:
     recording = rig("multisine", "constant")
     torques = np.stack([recording.torque, recording.torque + drift(recording, 0.3, 0.05)])

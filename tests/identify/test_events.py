@@ -145,6 +145,7 @@ def test_records_without_events_have_none(pattern: Any, seed: int) -> None:
         assert not any("lost" in reason or "short while" in reason for reason in result.reasons)
 
 
+@pytest.mark.slow
 def test_touches_are_said_where_they_are() -> None:
     rig = tvident.simulate_torsional_rig(20.0, seed=3, damping=0.041, angle_noise=1e-3, torque_snr_db=30.0)
     generator = np.random.default_rng(3)
@@ -161,6 +162,7 @@ def test_touches_are_said_where_they_are() -> None:
     assert calm.trusted[INSIDE].all()
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("damping", "seed", "named"), [(0.041, 1, True), (0.004, 2, False)])
 def test_a_gain_that_drifts_is_no_change_of_the_machine(damping: float, seed: int, named: bool) -> None:
@@ -170,6 +172,7 @@ def test_a_gain_that_drifts_is_no_change_of_the_machine(damping: float, seed: in
     assert said.startswith("inertia, damping and stiffness" if named else "inertia and stiffness")
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_gain_that_drifts_is_told_from_damping_and_stiffness_where_the_inertia_changes_too(seed: int) -> None:
@@ -197,6 +200,7 @@ def test_a_heavier_machine_is_no_gain_that_drifts() -> None:
     assert not any("by one factor" in advice for advice in result.advice)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("pattern", ["constant", "slider"])
 @pytest.mark.parametrize(("gain", "channel"), [(1.05, "torque"), (1.3, "torque"), (1.3, "angle")])
@@ -218,6 +222,7 @@ def test_a_gain_that_jumps_is_no_change_of_the_machine(
     assert "errors hold if the model does: see what to do" in result.summary()
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("pattern", ["constant", "slider"])
 @pytest.mark.parametrize("seconds", [12.0, 20.0])
@@ -247,6 +252,7 @@ def test_errors_that_look_like_one_factor_are_no_gain_that_drifts() -> None:
     assert not any("by one factor" in advice for advice in result.advice)
 
 
+@pytest.mark.slow
 def test_pulses_of_the_inertia_are_none_of_the_stiffness() -> None:
     begins, lasting = np.array([1.2, 3.0, 4.7, 10.0, 11.2, 14.6, 15.9]), 0.2
 

@@ -68,6 +68,7 @@ def test_what_a_few_blocks_tell_is_believed(drive: str, *, changes: bool) -> Non
     assert np.sqrt(np.mean(np.square(error[found.trusted]))) < 3
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("changes", [True, False])
 @pytest.mark.parametrize(("seed", "damping"), [(100, 0.06), (102, 0.06), (103, 0.06), (100, 0.3)])

@@ -27,6 +27,7 @@ def rig(seed: int = 0) -> tvident.Recording:
     return tvident.simulate_torsional_rig(seed=seed, pattern="constant", torque_snr_db=34.0, angle_noise=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("cutoff", "order", "lag"), [(20.0, 1, 7.39), (20.0, 2, 11.91), (50.0, 1, 3.11)])
 @pytest.mark.parametrize("channel", ["angle", "torque"])
@@ -105,6 +106,7 @@ def test_a_lag_beside_the_one_that_is_given_is_suspected(samples: int) -> None:
     assert told * RATE == pytest.approx(samples, abs=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [0, 5])
 def test_a_lag_much_longer_than_the_test_function_is_found(seed: int) -> None:
@@ -140,6 +142,7 @@ def test_a_filter_of_the_angle_without_a_lag_is_said(cutoff: float, order: int, 
     assert alike.value("inertia").value == pytest.approx(np.mean(recording.inertia), rel=5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [2, 0, 1, 3])
 @pytest.mark.parametrize("pattern", ["slider", "constant"])

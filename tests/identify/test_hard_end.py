@@ -56,6 +56,7 @@ def waves(t: Array, *, fastest: float) -> tuple[Array, Array]:
     return y, acceleration
 
 
+@pytest.mark.slow
 def test_order_15_in_windows_of_100001_samples() -> None:
     window, n = 100_001, 100_400
     half = window // 2
@@ -163,6 +164,7 @@ def test_a_glitch_leaves_with_its_sample() -> None:
 
 
 # Ten million samples, and less than a third of them.
+@pytest.mark.slow
 @pytest.mark.parametrize("repeats", [50, *long(167)])
 def test_millions_of_samples_take_a_filters_time_and_the_last_are_as_good_as_the_first(repeats: int) -> None:
     # The same minute again and again: the truth of the last is the result for the first.
@@ -189,6 +191,7 @@ def test_millions_of_samples_take_a_filters_time_and_the_last_are_as_good_as_the
     assert (difference < 2 * bound)[:, same].all()
 
 
+@pytest.mark.slow
 def test_identification_takes_the_memory_of_its_results() -> None:
     # Derivatives of two million samples alone would take 48 MB. Two threads hold pieces of some 20 000 rows of a dozen numbers: 4 MB.
     program = """

@@ -125,6 +125,7 @@ def test_what_becomes_of_missing_values_can_be_chosen(rig: tvident.Recording, fo
         identify(angle, rig.torque, form, nan_policy="raise")
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("form", ["strong", "auto", "weak"])
 def test_equations_are_taken_from_inside_the_mask_only(rig: tvident.Recording, form: str) -> None:
@@ -143,6 +144,7 @@ def test_equations_are_taken_from_inside_the_mask_only(rig: tvident.Recording, f
     assert error(masked, rig, mask) < 0.5 * error(touched, rig, mask)
 
 
+@pytest.mark.slow
 def test_a_mask_that_keeps_another_system_out_says_so(rig: tvident.Recording) -> None:
     n = rig.angle.size
     t = np.arange(n) / 1000
@@ -181,6 +183,7 @@ def test_a_lag_is_found(rig: tvident.Recording, samples: float) -> None:
     np.testing.assert_allclose(again.inertia, result.inertia, rtol=UNITS_OF_ROUNDING)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("form", ["auto", "weak", "strong"])
 def test_a_lag_that_is_known_is_taken_off(rig: tvident.Recording, form: str) -> None:
@@ -316,6 +319,7 @@ def test_a_lag_is_shorter_than_the_record(rig: tvident.Recording, lag: float) ->
         tvident.identify(rig.angle, rig.torque, sample_rate=1000, lag=lag)
 
 
+@pytest.mark.slow
 def test_words_about_the_noise_model_say_how_bad_it_is(rig: tvident.Recording) -> None:
     result = identify(rig.angle, rig.torque, "auto", inertia="constant", damping="constant", stiffness="constant")
     assert result.record_status & Status.NOISE_MODEL
@@ -323,6 +327,7 @@ def test_words_about_the_noise_model_say_how_bad_it_is(rig: tvident.Recording) -
     assert float(words.split(" times")[0].split()[-1]) > 4
 
 
+@pytest.mark.slow
 def test_errors_are_numbers_wherever_values_are() -> None:
     rig = tvident.simulate_torsional_rig(3.0)
     # What varies slowly is known much less well at one end of this record than within it.
@@ -342,6 +347,7 @@ def test_a_record_too_short_for_its_test_function_is_told_the_length_it_needs(ri
     tvident.identify(rig.angle[:397], rig.torque[:397], **call)
 
 
+@pytest.mark.slow
 def test_no_kind_of_recording_takes_long() -> None:
     # In vain an offset that is free in every window is tried of the other one.
     rig, other = (tvident.simulate_torsional_rig(20.0, seed=seed, angle_noise=1e-3) for seed in (1, 4))

@@ -99,6 +99,7 @@ CASES: dict[str, tuple[Any, Any, float, Any, dict[str, float]]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("name", CASES)
 def test_an_inner_parameter_is_found_within_its_error_and_nothing_else_is_biased(name: str) -> None:
@@ -121,6 +122,7 @@ def test_an_inner_parameter_is_found_within_its_error_and_nothing_else_is_biased
     assert not any("is not needed" in line for line in result.advice)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("name", CASES)
 def test_what_is_not_there_is_not_believed(name: str) -> None:
@@ -141,6 +143,7 @@ def one_record(effect: Any) -> tuple[Array, Array]:
     return angles[0], torques[0]
 
 
+@pytest.mark.slow
 def test_settings_replay_what_was_found_without_a_search() -> None:
     angle, torque = one_record(CASES["delay"][0])
     calls = []
@@ -173,6 +176,7 @@ def test_settings_replay_what_was_found_without_a_search() -> None:
     assert scan.estimates["reflex.delay"][nearest] == pytest.approx(0.045, abs=0.003)
 
 
+@pytest.mark.slow
 def test_a_record_of_a_batch_and_a_stored_result_know_their_inner_parameters(tmp_path: Path) -> None:
     angles, torques = (both[:2] for both in records(CASES["stribeck"][0], 2e-5))
     both = tvident.identify(angles, torques, terms=["coulomb", "stribeck", "offset"], **CONSTANT)
@@ -189,6 +193,7 @@ def test_a_record_of_a_batch_and_a_stored_result_know_their_inner_parameters(tmp
     np.testing.assert_array_equal(loaded.simulate(torques[1], [0.0, 0.0]), second.simulate(torques[1], [0.0, 0.0]))
 
 
+@pytest.mark.slow
 def test_the_end_of_a_range_is_said() -> None:
     angle, torque = one_record(CASES["delay"][0])
     short = tvident.Term("reflex", reflex, search={"delay": (0.005, 0.03)})
@@ -197,6 +202,7 @@ def test_the_end_of_a_range_is_said() -> None:
     assert any("highest of its range, 0.03: search a wider range" in line for line in result.advice)
 
 
+@pytest.mark.slow
 def test_the_factor_may_change_while_its_delay_does_not() -> None:
     def growing(t: Array, _: Any, velocity: Callable[[Array], Array]) -> Array:
         return (0.3 + 0.05 * t) * velocity(t - 0.045)
@@ -211,6 +217,7 @@ def test_the_factor_may_change_while_its_delay_does_not() -> None:
     assert np.sqrt(np.mean(score**2)) < 3
 
 
+@pytest.mark.slow
 def test_two_inner_parameters_are_searched_together_in_strong_form() -> None:
     def answer(t: Array, angle: Array, velocity: Array, delay: float, limit: float) -> Array:
         return np.clip(reflex(t, angle, velocity, delay), -limit, limit)
@@ -241,6 +248,7 @@ def test_stribeck_friction_is_simulated_with_what_was_found() -> None:
     assert np.isfinite(result.simulate(torque, state)).all()
 
 
+@pytest.mark.slow
 def test_friction_that_fades_too_fast_for_the_samples_is_said() -> None:
     """With 90 rad/s² the velocity crosses twice 0.25 rad/s within three samples."""
     angle, torque = one_record(lambda t, _, velocity: np.sign(velocity(t)) * 0.2 + 0.5 * stribeck(velocity(t), 0.25))

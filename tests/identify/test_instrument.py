@@ -48,6 +48,7 @@ def test_estimates_are_right_under_feedback_and_their_errors_hold(
     assert least <= np.mean(inside) <= most
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("every", [1, 10])
 @pytest.mark.parametrize("method", ["weak", "strong"])
@@ -103,6 +104,7 @@ def test_feedback_is_said_in_both_forms_and_of_few_samples(
         assert not is_said(tvident.identify(angle, torque, sample_rate=RATE, method=method, instrument=reference))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seeds", [range(2), *long(range(2, 40))], ids=str)
 def test_open_loop_is_not_taken_for_feedback(seeds: range) -> None:
     for seed in seeds:

@@ -110,6 +110,7 @@ def test_splines_of_settings_are_taken_and_not_looked_for(monkeypatch: pytest.Mo
     assert again.constants != result.constants
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("jitter", "noise"), [(0.3, (1e-3, 0.1)), (1.0, (1e-2, 0.1))])
 def test_errors_are_those_that_are_told(jitter: float, noise: tuple[float, float]) -> None:
@@ -131,6 +132,7 @@ def test_errors_are_those_that_are_told(jitter: float, noise: tuple[float, float
     assert loss < 1.3
 
 
+@pytest.mark.slow
 def test_stamps_that_jitter_are_told_from_samples_that_do() -> None:
     even = jittered(3, 0.0)
     stamps = jittered(3, 0.6)

@@ -53,6 +53,7 @@ def test_every_jump_is_found_and_windows_end_there(angle_noise: float) -> None:
     assert (result.status & (Status.GAP | Status.INVALID | Status.COLOURED) == 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("pattern", ["slider", "ramp", "constant"])
 @pytest.mark.parametrize("angle_noise", [*long(1e-6), 1e-2, *long(1e-1)])

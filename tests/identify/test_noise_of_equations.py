@@ -32,6 +32,7 @@ def error(values: Array, true: Array) -> float:
     return float(np.sqrt(np.mean((values / true - 1)[INTERIOR] ** 2)))
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("torque_snr_db", [*long(NOISE_FREE), 80.0])
 @pytest.mark.parametrize("converter", [False, True])
@@ -80,6 +81,7 @@ def coloured(kind: str, samples: int, seed: int) -> Array:
     return np.asarray(noise / noise.std())
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("kind", ["0.8", "0.95", "pink"])
 def test_coloured_noise_of_the_torque_is_no_change_of_the_parameters(kind: str) -> None:
@@ -113,6 +115,7 @@ def test_noise_that_lasts_longer_than_a_test_function_is_no_change_either(kind: 
     assert error(result.inertia, rig.inertia) < 2e-3
 
 
+@pytest.mark.slow
 def test_what_the_channels_do_not_explain_is_said_as_before() -> None:
     rig = tvident.simulate_torsional_rig(12.0, seed=0, pattern="constant")
     torque = rig.torque + 0.3 * rig.torque.std() * np.sign(rig.true_velocity)

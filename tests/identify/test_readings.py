@@ -73,6 +73,7 @@ def test_readings_of_both_channels_at_once_are_those_of_a_slower_recorder() -> N
     assert not both.record_status & Status.LAG_SUSPECTED
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("hold", [20, 5])
 def test_a_torque_that_comes_late_by_half_of_what_it_holds_was_read(hold: int) -> None:
@@ -108,6 +109,7 @@ def test_settings_repeat_what_was_done_to_two_holds_and_gaps() -> None:
         assert f"the {name} holds every value for {hold} samples" in first.reasons[0]
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("hold", [5, 2, 10, 20])
 def test_a_torque_that_acts_in_steps_stays(hold: int) -> None:
@@ -135,6 +137,7 @@ def test_a_torque_that_acts_in_steps_stays(hold: int) -> None:
     assert lag * RATE == pytest.approx(-0.5, abs=0.05)
 
 
+@pytest.mark.slow
 def test_lines_of_an_angle_become_splines() -> None:
     """Lines of 10 samples made the inertia 1.5 % too large, or zero. A torque may act along lines, and stays."""
     rig = tvident.simulate_torsional_rig(20.0, seed=1, angle_noise=1e-3)
@@ -219,6 +222,7 @@ def test_an_angle_that_was_rounded_is_not_held() -> None:
     assert readings_of(np.round(np.round(turns) * 0.00157, 3)) is None
 
 
+@pytest.mark.slow
 def test_held_angles_with_missing_readings_and_of_several_records() -> None:
     rig = tvident.simulate_torsional_rig(10.0, seed=6, angle_noise=1e-3)
     angle, torque = held(rig.angle, 4), rig.torque.copy()

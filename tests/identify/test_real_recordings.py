@@ -31,6 +31,7 @@ def recording(folder: Path, name: str) -> Path:
 
 
 # What the numbers are in windows of other lengths is tested below, without starting the command each time.
+@pytest.mark.slow
 @pytest.mark.parametrize("window", [*long(21), 201])
 def test_the_positioning_system_from_the_command_line(folder_of_recordings: Path, tmp_path: Path, window: int) -> None:
     command = [
@@ -167,6 +168,7 @@ def test_the_oscillator_with_a_hardening_spring(folder_of_recordings: Path) -> N
         assert result.constants[name][0] == pytest.approx(reference, rel=tolerance), name
 
 
+@pytest.mark.slow
 def test_the_stiffness_of_the_oscillator_follows_its_amplitude(folder_of_recordings: Path) -> None:
     angle, torque = oscillator(folder_of_recordings)
     call: dict[str, Any] = {"inertia": "constant", "damping": "constant", "regression_window": "0.2 s"}
@@ -204,6 +206,7 @@ def test_the_ankle_obeys_the_model_only_before_the_reflex(folder_of_recordings: 
     assert 0.5e-3 < late["lag"] < 1.5e-3
 
 
+@pytest.mark.slow
 def test_what_disagrees_with_what_is_said_of_this_record(folder_of_recordings: Path) -> None:
     """Widths from 11 to 191 samples agree, on another damping than short windows of a stiffness that is none leave."""
     channels = recordings.read(recording(folder_of_recordings, "emps.mat"))

@@ -81,6 +81,7 @@ def test_a_rig_that_lost_samples_is_the_whole_rig(loss: tuple[float, int], seed:
             assert result.trusted.mean() > 0.98
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("loss", LOSSES)
 @pytest.mark.parametrize("seed", [1, *long(2, 3)])
@@ -100,6 +101,7 @@ def test_a_carriage_that_lost_samples_is_the_whole_carriage(
             assert not more or stderr < 1.5 * whole.constants[name][1], name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, *long(2)])
 def test_a_carriage_whose_times_are_shuffled_or_whose_force_is_slower_is_the_same(
     folder_of_recordings: Path, seed: int
@@ -164,6 +166,7 @@ def test_recordings_with_their_own_times_are_their_finely_resampled_selves(
         assert abs(resampled.constants[one][0] - value) < 2 * stderr, one
 
 
+@pytest.mark.slow
 def test_records_of_a_batch_that_lack_little_are_as_alone() -> None:
     simulated, whole = rig(1)
     angle, torque = np.asarray(simulated.angle), np.asarray(simulated.torque)

@@ -101,6 +101,7 @@ def test_what_was_moved_is_repeated_by_its_settings() -> None:
     np.testing.assert_array_equal(again.stderr["inertia"], first.stderr["inertia"])
 
 
+@pytest.mark.slow
 def test_a_low_passed_angle_is_not_believed() -> None:
     recorded = rig(4)
     smooth = np.convolve(recorded.angle, np.hanning(41) / np.hanning(41).sum(), mode="full")[: recorded.angle.size]
@@ -208,6 +209,7 @@ def test_what_a_recorder_did_is_named_with_its_cure(spoil: Any, words: str) -> N
     assert not identified(recorded).record_status & Status.CHANNEL_SUSPECTED
 
 
+@pytest.mark.slow
 def test_channels_that_were_drawn_in_straight_lines_are_named() -> None:
     """Lines between samples weaken fast motion: the inertia was .4 % off, 15 standard errors, without a word."""
     recorded = rig(8, 10.0)

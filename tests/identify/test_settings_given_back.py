@@ -163,6 +163,7 @@ def _records() -> dict[str, tuple[Array, Array, dict[str, Any]]]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("name", _records())
 def test_a_repeated_call_finds_and_says_the_same(name: str) -> None:
@@ -179,6 +180,7 @@ def test_a_repeated_call_finds_and_says_the_same(name: str) -> None:
         assert first.record_status & tvident.Status.SCALES_DISAGREE
 
 
+@pytest.mark.slow
 def test_a_kind_that_is_given_beside_settings_is_not_decided_again() -> None:
     angle, torque = _of_two_that_change(2)
     settings = tvident.identify(angle, torque, sample_rate=1000).settings
@@ -188,6 +190,7 @@ def test_a_kind_that_is_given_beside_settings_is_not_decided_again() -> None:
     assert again.settings["kinds"]["damping"] == "constant"
 
 
+@pytest.mark.slow
 def test_settings_of_another_record_leave_its_lag_to_be_suspected() -> None:
     record = _rig(1)
     settings = tvident.identify(record.angle[3:], record.torque[:-3], sample_rate=1000, lag="auto").settings

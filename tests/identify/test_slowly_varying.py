@@ -41,6 +41,7 @@ def identified(
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("pattern", "name", "depth", "angle_noise", "call"),
     [
@@ -96,6 +97,7 @@ def test_what_is_constant_and_said_to_vary_stays_where_it_is() -> None:
     assert (np.median(result.stderr["inertia"][:4], axis=1) > errors).all()
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize(("seed", "late"), [(0, 0), (3, 2), *long((1, 0), (4, 3))])
 def test_a_lag_is_not_found_in_damping_that_grows_along_a_sweep(seed: int, late: int) -> None:

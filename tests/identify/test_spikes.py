@@ -116,6 +116,7 @@ def test_readings_that_failed_count_as_missing(channel: str, value: float, lengt
     assert "make them NaN, or use method='auto'" in kept
 
 
+@pytest.mark.slow
 def test_a_torque_that_is_switched_off_is_a_torque() -> None:
     """Short pauses that the machine feels, of a torque that is one of few values."""
     time = np.arange(200_000) / 10_000

@@ -16,6 +16,7 @@ SCATTER = 0.23
 KINDS = ("inertia", "damping", "stiffness")
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize(
     "call",

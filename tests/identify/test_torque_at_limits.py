@@ -42,6 +42,7 @@ def is_near(found: Identification) -> bool:
     return all(abs(ratio - 1) < OFF for ratio in ratios)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", range(4))
 def test_samples_at_the_limit_of_a_recorder_count_as_missing(seed: int) -> None:
@@ -58,6 +59,7 @@ def test_samples_at_the_limit_of_a_recorder_count_as_missing(seed: int) -> None:
     np.testing.assert_array_equal(identify(angle, missing, sample_rate=RATE).inertia, found.inertia)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", range(4))
 def test_samples_at_the_limit_of_a_drive_count(seed: int) -> None:

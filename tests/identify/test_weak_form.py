@@ -243,6 +243,7 @@ def test_misuse_says_the_rule_the_value_and_the_cure(
         tvident.identify(angle, torque, sample_rate=1000, **plain_weak(**call))
 
 
+@pytest.mark.slow
 def test_constants_alone_are_weighted_by_their_noise(rig_of_constants: list[tvident.Recording]) -> None:
     squares: dict[Literal["average", "window"], list[float]] = {"average": [], "window": []}
     scores = []
@@ -304,6 +305,7 @@ def test_a_disturbance_where_the_noise_is_least_is_not_given_weight() -> None:
     assert found.constants == alike.constants
 
 
+@pytest.mark.slow
 def test_windows_as_long_as_the_record_are_told() -> None:
     rig = tvident.simulate_torsional_rig(12.0, seed=5)
     for more, is_told in (({}, True), ({"regression_window": "0.2 s"}, False), (CONSTANT, False)):

@@ -68,6 +68,7 @@ def test_a_sample_without_weight_is_left_out_where_missing_ones_propagate() -> N
     assert np.isnan(both.stiffness[2000])
 
 
+@pytest.mark.slow
 def test_weights_make_errors_smaller_where_half_of_the_record_is_noisier() -> None:
     errors: dict[str, list[float]] = {"without": [], "with": []}
     constant: Any = dict.fromkeys(("inertia", "damping", "stiffness"), "constant")
@@ -87,6 +88,7 @@ def test_weights_make_errors_smaller_where_half_of_the_record_is_noisier() -> No
     assert 0.23 < np.mean(np.square(standardised)) < 2.4
 
 
+@pytest.mark.slow
 def test_errors_hold_where_half_of_the_record_is_noisier() -> None:
     covered = []
     for seed in range(3):

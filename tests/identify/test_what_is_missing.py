@@ -126,6 +126,7 @@ def test_what_is_missing_is_named(missing: dict[str, float], change: str, moved:
     assert found.summary().startswith("do not trust: ")
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [1, *long(3)])
 @pytest.mark.parametrize("missing", [{"late": 3}, {"late": 1}, {"friction": 0.02}, {"friction": 0.1}], ids=str)
@@ -169,6 +170,7 @@ def test_damping_is_not_trusted_beside_friction_that_moves_it(rig: dict[str, Any
     assert found.summary().startswith("do not trust: another equation explains more, and finds another damping")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [*range(3), *long(*range(3, 9))])
 def test_short_records_that_obey_are_trusted(seed: int) -> None:
     angle, torque = record(seed, seconds=3, growth=seed % 2)
@@ -177,6 +179,7 @@ def test_short_records_that_obey_are_trusted(seed: int) -> None:
     assert "another equation" not in found.summary()
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("seed", "damping", "share"), [(3, 0.01, 0.2), (7, 0.03, 0.3), *long((0, 0.01, 0.2), (4, 0.02, 0.3))]
@@ -192,6 +195,7 @@ def test_a_hardening_spring_of_a_resonating_machine_is_named(seed: int, damping:
     assert found.summary().startswith("do not trust: ")
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_rig_that_obeys_hears_nothing(seed: int) -> None:
@@ -202,6 +206,7 @@ def test_a_rig_that_obeys_hears_nothing(seed: int) -> None:
     assert found.advice == ()
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("method", ["auto", *long(tvident.StrongForm(window_length=51))])
 @pytest.mark.parametrize(("seed", "asymmetry"), [(4, 0.2), *long((1, 0.2), (3, 0.2), (6, 0.2))])
@@ -219,6 +224,7 @@ def test_damping_that_differs_between_the_directions_is_named(seed: int, asymmet
         assert better.value(name).value == pytest.approx(true, rel=0.01), name
 
 
+@pytest.mark.slow
 def test_numbers_in_advice_are_those_that_the_better_equation_finds(tried: list[dict[str, object]]) -> None:
     """What is told of a term was what all constants find, 17 N m/rad^3 of 30. Once it leaves nothing the others are not tried."""
     angle, torque = record(1, hardening=30)
@@ -232,6 +238,7 @@ def test_numbers_in_advice_are_those_that_the_better_equation_finds(tried: list[
     assert abs(better.value - 30) <= 4 * better.stderr
 
 
+@pytest.mark.slow
 def test_a_part_of_a_long_record_tells_what_is_missing() -> None:
     """Trials take the busiest 33 000 of 70 000 samples; the part that is at rest tells nothing."""
     angle, torque = record(5, friction=0.1, seconds=70)
@@ -264,6 +271,7 @@ def tried(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, object]]:
     return calls
 
 
+@pytest.mark.slow
 def test_what_constants_explain_down_to_the_noise_needs_no_windows(tried: list[dict[str, object]]) -> None:
     rig = tvident.simulate_torsional_rig(pattern="constant", seed=300)
     found = tvident.identify(rig.angle[3:], rig.torque[:-3], sample_rate=RATE)
@@ -271,6 +279,7 @@ def test_what_constants_explain_down_to_the_noise_needs_no_windows(tried: list[d
     assert [call["lag"] for call in tried if call["stiffness"] == "windowed"] == [pytest.approx(0.003, abs=1e-4)]
 
 
+@pytest.mark.slow
 def test_the_equation_at_hand_is_not_tried_again(tried: list[dict[str, object]]) -> None:
     angle, torque = record(0, late=3)
     assert tvident.identify(angle, torque, sample_rate=RATE).advice
@@ -279,6 +288,7 @@ def test_the_equation_at_hand_is_not_tried_again(tried: list[dict[str, object]])
     assert (["offset"], "auto") in windowed
 
 
+@pytest.mark.slow
 def test_reasons_do_not_wait_for_what_advice_tries(tried: list[dict[str, object]]) -> None:
     rig = tvident.simulate_torsional_rig(6.0, pattern="constant", seed=300)
     found = tvident.identify(rig.angle[3:], rig.torque[:-3], sample_rate=RATE)
@@ -308,6 +318,7 @@ def test_what_is_held_back_is_identified_once_for_all_distances(monkeypatch: pyt
     assert shares[0] == shares[2] != shares[1]
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [4, *long(1, 3, 6)])
 def test_backlash_of_the_spring_is_named(seed: int) -> None:

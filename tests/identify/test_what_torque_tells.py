@@ -108,6 +108,7 @@ def coupled(seed: int, resonance: float, *, behind: bool) -> tuple[Array, Array,
     return angles, torques, resonance
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [0, *long(1, 2, 3)])
 @pytest.mark.parametrize("stiffness", ["constant", "windowed"])
@@ -131,6 +132,7 @@ def test_a_torque_that_comes_late_is_no_coupling_that_bends() -> None:
     assert not any(BENDS in line for line in result.advice)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("seed", "excitation", "bits"),

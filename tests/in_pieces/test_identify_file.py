@@ -135,6 +135,7 @@ def test_missing_samples_leave_other_pieces_as_they_are(rig: tvident.Recording) 
     assert (written["status"][30_000:30_050] & Status.GAP != 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("choose", [True, False])
 def test_the_weak_form_finds_what_one_call_in_memory_finds(rig: tvident.Recording, choose: bool) -> None:
@@ -156,6 +157,7 @@ def test_the_weak_form_finds_what_one_call_in_memory_finds(rig: tvident.Recordin
     assert found.record_status == whole.record_status
 
 
+@pytest.mark.slow
 def test_weights_are_a_channel_of_the_file(rig: tvident.Recording) -> None:
     # Noise is ten times as large from 20 s on, and from 50 s on, in all of the last piece, nothing counts.
     weights = np.repeat([1.0, 0.01, 0.0], [20_000, 30_000, SAMPLES - 50_000])

@@ -35,6 +35,7 @@ def run(text: str, *options: str) -> tuple[list[dict[str, Any]], str]:
     return [json.loads(line) for line in done.stdout.splitlines()], done.stderr
 
 
+@pytest.mark.slow
 def test_csv_and_json_lines_become_json_lines_with_the_batchs_numbers() -> None:
     t, angle, torque = (np.asarray(each) for each in (RIG.time, RIG.angle, RIG.torque))
     csv = "t,torque [N m],angle\n" + "".join(
@@ -82,6 +83,7 @@ def test_units_of_a_header_are_converted(
     assert "could not be read" not in words
 
 
+@pytest.mark.slow
 def test_settings_of_a_result_in_weak_form_give_its_stream(tmp_path: Path) -> None:
     earlier = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000)
     (tmp_path / "chosen.json").write_text(json.dumps(earlier.settings))
@@ -220,6 +222,7 @@ def test_what_cannot_be_read_is_missing_and_said() -> None:
     assert "2 lines could not be read" in words
 
 
+@pytest.mark.slow
 def test_a_mark_of_the_alphabet_hides_no_sample_and_no_name() -> None:
     """The first sample was taken for a header, and `t` not found."""
     rows = "".join(f"{a!r},{b!r}\n" for a, b in zip(RIG.angle[:50].tolist(), RIG.torque[:50].tolist(), strict=True))

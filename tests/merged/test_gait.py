@@ -8,6 +8,7 @@ from merged import gait
 from parameters import long
 
 
+@pytest.mark.slow
 def test_cycles_that_are_alike_are_known_better_than_published() -> None:
     record = gait.simulated(1)
     for method, most in ((gait.aligned, gait.PUBLISHED[1]), (lambda one: gait.harmonics(one, 11), gait.PUBLISHED[0])):

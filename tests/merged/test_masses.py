@@ -132,6 +132,7 @@ def test_errors_of_six_masses_are_as_large_as_is_said(seeds: range) -> None:
     assert 0.90 < np.mean(of_changing) < 0.98
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("masses", "angle_noise"), [(3, 1e-3), *long((2, 1e-3), (2, 1e-2), (3, 1e-2))])
 def test_errors_know_that_every_equation_has_another_noise(masses: int, angle_noise: float) -> None:
     # Of seeds 40 to 51 95 % are inside for 2 masses and 94 to 95 % for 3; with the mean covariance of all equations 90, 87 and 88 %.

@@ -31,6 +31,7 @@ def crossing(t: Array) -> Array:
     return stiffness
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seeds", [range(2), *long(range(24))])
 def test_modes_that_cross_are_not_exchanged(seeds: range) -> None:
     deviations: list[Array] = []

@@ -39,6 +39,7 @@ def mechanism(step: int = 2) -> Any:
     return identify(one.angle, one.torque, t=one.time, structure=pendulum(), step=step, **FRICTION)
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("made", [masses, trials, mechanism])
 def test_what_was_saved_comes_back(made: Any, tmp_path: Path) -> None:
@@ -76,6 +77,7 @@ def test_what_was_saved_comes_back(made: Any, tmp_path: Path) -> None:
     assert tvident.read_recording(tmp_path / "result.csv")["residual_std"].size == result.time.size
 
 
+@pytest.mark.slow
 def test_results_are_drawn() -> None:
     result = masses()
     shown = result.plot()

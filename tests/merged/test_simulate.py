@@ -136,6 +136,7 @@ def test_a_base_that_moves_drives_what_is_simulated() -> None:
         found.vaf(other.angle, other.torque)
 
 
+@pytest.mark.slow
 def test_terms_of_masses_are_simulated() -> None:
     one = chain([constant(12.0), constant(18.0)], 2000, seed=11, angle_noise=1e-4)
     drag = tvident.Term("drag", lambda _t, _angle, velocity: velocity * np.abs(velocity))
@@ -156,6 +157,7 @@ def test_terms_of_masses_are_simulated() -> None:
         found.vaf(one.angle[:, shown], copied)
 
 
+@pytest.mark.slow
 def test_a_mechanism_responds_as_it_was_simulated() -> None:
     one = double_pendulum(2000, seed=1)
     found = identify(one.angle, one.torque, t=one.time, structure=pendulum(), **FRICTION)

@@ -67,6 +67,7 @@ def within_20_ms(values: Array, before: float, after: float) -> bool:
     return bool(first_high - last_low <= 20)
 
 
+@pytest.mark.slow
 def test_short_trials_together_follow_what_none_could() -> None:
     trials = simulated(50, 500, lambda t: np.where(t < 0.2465, 12.0, 18.0), seed=3)
     found = identify(trials.angle, trials.torque, **OPTIONS)
@@ -84,6 +85,7 @@ def test_short_trials_together_follow_what_none_could() -> None:
     assert inside[found.status == 0].mean() > 0.8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [4016, 4000, *long(4018, 4028, 4039, 4048)])
 def test_windows_end_at_a_jump_when_their_length_is_chosen(seed: int) -> None:
     # Lengths were compared across a jump that had just been found: of 60 records 47 had the shortest, and of five an offset was said to
@@ -182,6 +184,7 @@ def test_steps_of_a_full_endpoint_stiffness_are_followed(seed: int, at: float) -
     assert all(found.identifiable.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "at"), [(15505, 3.302), *long((15502, 1.947), (15507, 1.953), (15512, 3.347))])
 def test_entries_that_step_together_are_set_free_together(seed: int, at: float) -> None:
     # After the first was followed neither of the others explained a fifth alone, and no jump was seen beside them: both stayed

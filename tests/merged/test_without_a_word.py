@@ -64,6 +64,7 @@ def with_coloured_torque(masses: Masses, seed: int) -> Array:
     return np.asarray(masses.torque + 0.1 * driving * noise * np.sqrt(1 - 0.81))
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize(
     ("masses", "driven", "spring"),
@@ -106,6 +107,7 @@ def test_a_spring_that_is_wrongly_asked_for_as_constant_is_named(
     assert set(found.kinds.values()) == {"constant"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, *long(1, 2)])
 @pytest.mark.parametrize(("driven", "angle_noise"), [(None, 1e-3), (None, 1e-5)])
 def test_nothing_else_follows_a_spring_that_jumps(
@@ -120,6 +122,7 @@ def test_nothing_else_follows_a_spring_that_jumps(
     assert np.sqrt(np.nanmean(error**2)) < 0.015 * 20
 
 
+@pytest.mark.slow
 def test_what_swings_many_times_is_followed_rather_than_what_follows_it() -> None:
     # Parts of the record do not differ in the spring, and they did in an inertia: the spring was 3.5 % off, 39 standard errors.
     springs = [lambda t: np.asarray(12 + 0.6 * np.sin(2 * np.pi * 0.5 * t)), constant(18.0), constant(16.0)]
@@ -130,6 +133,7 @@ def test_what_swings_many_times_is_followed_rather_than_what_follows_it() -> Non
     assert np.sqrt(np.nanmean(error**2)) < 0.015 * 12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spoilt", "words"),
     [
@@ -195,6 +199,7 @@ def test_terms_to_give_keep_the_kinds_that_were_given() -> None:
     assert any(line.endswith("give terms=[('offset', 'windowed'), 'coulomb']") for line in found.advice), found.advice
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", [0.01, *long(0.05)])
 def test_friction_beside_missing_samples_is_as_large(lost: float) -> None:
     """Windows of the velocity with a gap counted as rest: .037 of .05 N m were left with a hundredth lost, and nothing with .05."""
@@ -222,6 +227,7 @@ def test_clean_chains_hear_nothing(seeds: range) -> None:
             assert not found.advice
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("changes", [0, *long(1)])
 def test_a_spring_that_no_equation_tells_has_no_number(changes: int) -> None:
     # The angle of a mass is missing for a second: the spring that no other equation holds was zero there, without an error, and trusted.
@@ -247,6 +253,7 @@ def test_a_spring_is_known_beside_one_sample_that_was_lost() -> None:
     assert (error < np.maximum(5 * found.stderr["stiffness_base_0"], 0.3)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.first(2)
 @pytest.mark.parametrize("angle_noise", [1e-4, *long(1e-5, 1e-3)])
 @pytest.mark.parametrize("seed", [0, *long(1, 2)])
@@ -264,6 +271,7 @@ def test_nothing_is_drawn_to_zero_where_a_force_acts_on_one_mass(seed: int, angl
     assert np.sqrt(np.nanmean(error**2)) < 0.02 * 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("masses", "driven", "changes"), [(2, 1, 0), *long((2, 1, 1), (3, 2, 0))])
 def test_a_chain_on_a_moving_base_holds_its_scale(masses: int, driven: int, changes: int) -> None:
     # Of 30 such records three were 72 to 100 % off, two of them trusted in a part.
@@ -289,6 +297,7 @@ def test_a_chain_on_a_moving_base_holds_its_scale(masses: int, driven: int, chan
         assert not found.trusted.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("masses", "driven", "changes", "seed"),
     [(3, 2, 0, 39), (2, 0, 0, 39), *long((3, 2, 1, 40), (3, 0, 2, 39), (3, 0, 2, 40))],
@@ -387,6 +396,7 @@ def test_the_zero_of_an_angle_is_none_of_the_machine(masses: int, what: str) -> 
             )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("driven", "changes"), [(2, 1), *long((2, 0), (0, 2), (1, 1))])
 def test_a_constant_beside_elements_that_are_free_draws_nothing_to_zero(driven: int, changes: int) -> None:
     # Counting less with every step from a force was for constants alone: springs and inertias of the far masses were zero.
@@ -404,6 +414,7 @@ def test_a_constant_beside_elements_that_are_free_draws_nothing_to_zero(driven: 
     assert not found.trusted.any()
 
 
+@pytest.mark.slow
 def test_what_a_channel_or_a_kind_contradicts_is_not_trusted() -> None:
     # All masses are driven, so that nothing is drawn to zero: elements 7 to 14 % off were trusted.
     springs = [lambda t: np.asarray(12 * (1 + 0.2 * np.sin(0.9 * t))), constant(18.0), constant(16.0)]

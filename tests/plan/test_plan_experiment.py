@@ -51,6 +51,7 @@ def test_errors_are_the_bound(angle_noise: float) -> None:
     assert np.mean(np.square(off)) < 1 + 4 * math.sqrt(2 / 12)
 
 
+@pytest.mark.slow
 def test_a_stiffness_that_changes_has_the_bound_of_its_windows() -> None:
     plan = tvident.plan_experiment(**GUESS, torque_noise=0.02, torque_rms=0.2, duration=20, resolution=2.0)
     angle, torque = recorded(plan, 0, (0.0, 0.02))

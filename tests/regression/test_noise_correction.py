@@ -182,6 +182,7 @@ def parameters_of(case: Case, rows: Rows, found: Any) -> Array:
     return np.array([values["inertia"], max(values["damping"], 0.0), values["stiffness"]])
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(25))
 @given(drawn=cases)
 @example(

@@ -121,6 +121,7 @@ def hour(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, np.n
     return path, channels
 
 
+@pytest.mark.slow
 def test_an_hour_is_small_opens_at_once_and_shows_every_sample(
     browser: Any, hour: tuple[Path, dict[str, np.ndarray[Any, Any]]], tmp_path: Path
 ) -> None:
@@ -170,6 +171,7 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tvident.Ident
     return path, result
 
 
+@pytest.mark.slow
 def test_dragging_shows_the_same_time_in_all_plots_and_a_double_click_the_whole(
     browser: Any, short: tuple[Path, tvident.Identification]
 ) -> None:
@@ -213,6 +215,7 @@ def test_dragging_shows_the_same_time_in_all_plots_and_a_double_click_the_whole(
     opened.close()
 
 
+@pytest.mark.slow
 def test_a_plot_without_numbers_says_so(browser: Any, tmp_path: Path) -> None:
     rig = tvident.simulate_torsional_rig(4.0)
     result = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
@@ -230,6 +233,7 @@ def test_a_plot_without_numbers_says_so(browser: Any, tmp_path: Path) -> None:
     opened.close()
 
 
+@pytest.mark.slow
 def test_words_of_a_plot_stand_apart_and_on_one_line(browser: Any, short: tuple[Path, tvident.Identification]) -> None:
     opened = Opened(browser, short[0])
     overlapping = """() => {
@@ -268,6 +272,7 @@ def test_words_of_a_plot_stand_apart_and_on_one_line(browser: Any, short: tuple[
     opened.close()
 
 
+@pytest.mark.slow
 def test_a_page_of_masses_opens_like_any_other(browser: Any, tmp_path: Path) -> None:
     one = chain([changing, constant(18.0)], 1500, seed=3)
     structure = tvident.Chain(2, [("base", 0), (0, 1)])

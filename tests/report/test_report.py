@@ -206,6 +206,7 @@ def test_where_windows_have_no_equations_there_is_no_condition_number(tmp_path: 
     assert np.nanmin(found) >= 1
 
 
+@pytest.mark.slow
 def test_masses_have_a_page_with_every_element_and_torque(tmp_path: Path) -> None:
     one = chain([constant(12.0), lambda t: 18 + 2 * np.sin(3 * t)], 2500, seed=1, base=True)
     structure = tvident.Chain(2, [("base", 0), (0, 1)], base=one.base)

@@ -74,6 +74,7 @@ def test_the_response_is_that_of_the_equation(terms: tuple[float, float]) -> Non
     np.testing.assert_allclose(found.angle[0], expected, atol=INTEGRATED * np.abs(expected).max(), rtol=0)
 
 
+@pytest.mark.slow
 def test_an_identified_rig_explains_its_angle_and_a_recording_it_has_not_seen(
     rig: tvident.Recording, result: tvident.Identification
 ) -> None:
@@ -197,6 +198,7 @@ def test_what_cannot_be_simulated_is_refused_with_the_rule(
     np.testing.assert_allclose(spring.simulate(rig.torque), rig.torque / spring.stiffness[0], rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_result_knows_its_record_only_as_long_as_it_is_there(rig: tvident.Recording) -> None:
     angle, torque = rig.angle.copy(), rig.torque.copy()
     result = tvident.identify(angle, torque, sample_rate=1000, stiffness="constant")
@@ -241,6 +243,7 @@ ALIKE = 1.0
 """Percent of the variance that the same samples may be explained by differently: constants are those of 59 s or of 590 s."""
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("stiffness", ["constant", "windowed"])
 def test_a_long_record_is_told_by_stretches_of_it(stiffness: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -262,6 +265,7 @@ def test_a_long_record_is_told_by_stretches_of_it(stiffness: Any, monkeypatch: p
         assert getattr(found, name) == pytest.approx(getattr(whole, name), abs=ALIKE)
 
 
+@pytest.mark.slow
 def test_a_long_record_whose_stretches_are_lost_is_told_by_all_of_it() -> None:
     long = tvident.simulate_torsional_rig(660.0, pattern="constant", seed=5)
     angle = long.angle.copy()

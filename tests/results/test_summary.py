@@ -40,6 +40,7 @@ def followed(result: tvident.Identification, angle: Any, torque: Any) -> tvident
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [2, 3])
 def test_a_machine_without_spring_is_told_so_and_is_right_when_it_follows(seed: int) -> None:
@@ -83,6 +84,7 @@ def test_a_lag_is_late_or_early(late: int, word: str) -> None:
     assert again.value("damping").value == pytest.approx(0.0081, rel=0.1)
 
 
+@pytest.mark.slow
 def test_records_of_a_batch_have_remedies_as_one_alone() -> None:
     rig = tvident.simulate_torsional_rig(duration=3.0, seed=3, pattern="constant")
     torques = np.stack([rig.torque, rig.torque + 0.08 * np.sign(np.gradient(rig.angle))])
@@ -102,6 +104,7 @@ def test_friction_that_drives_the_motion_is_never_offered() -> None:
     assert "friction of" not in advice
 
 
+@pytest.mark.slow
 def test_the_positioning_system_leads_to_what_was_published(folder_of_recordings: Path) -> None:
     path = folder_of_recordings / "emps.mat"
     if not path.exists():
@@ -198,6 +201,7 @@ def test_a_torque_that_is_mostly_noise_is_explained_as_far_as_it_is_none() -> No
     assert other.summary().startswith("do not trust: ")
 
 
+@pytest.mark.slow
 def test_a_model_that_predicts_worse_than_a_constant_explains_nothing() -> None:
     rig = tvident.simulate_torsional_rig(duration=5.0, seed=4)
     result = tvident.identify(rig.angle, -np.roll(rig.torque, 5), sample_rate=1000)

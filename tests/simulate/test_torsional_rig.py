@@ -11,6 +11,7 @@ from parameters import long
 from tvident._simulate import motion
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pattern", ["slider", *long("ramp", "square", "constant")])
 @pytest.mark.parametrize("excitation", ["multisine", "chirp", "random"])
 def test_the_angle_does_not_change_with_finer_steps(
