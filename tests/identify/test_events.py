@@ -174,6 +174,17 @@ def test_a_gain_that_drifts_is_no_change_of_the_machine(damping: float, seed: in
 
 @pytest.mark.slow
 @pytest.mark.first(1)
+@pytest.mark.parametrize("seed", [406, 400, 403])
+def test_a_gain_that_drifts_by_little_is_named_where_it_is_beyond_errors(seed: int) -> None:
+    rig = tvident.simulate_torsional_rig(30.0, seed=seed, pattern="constant", damping=0.041, angle_noise=1e-3)
+    for drift, said in ((0.03, 1), (0.0, 0)):
+        result = tvident.identify(rig.angle, rig.torque * (1 + drift * rig.time / 30.0), sample_rate=RATE)
+        assert sum("by one factor" in advice for advice in result.advice) == said
+        assert bool(result.record_status & Status.CHANNEL_SUSPECTED) == bool(said)
+
+
+@pytest.mark.slow
+@pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_gain_that_drifts_is_told_from_damping_and_stiffness_where_the_inertia_changes_too(seed: int) -> None:
     heavier = tvident.simulate_torsional_rig(

@@ -19,7 +19,7 @@ Array = npt.NDArray[np.float64]
 _ONE_FACTOR = 0.2
 """Inertia and stiffness change by one factor where they differ from it by less than this part of its change."""
 
-_CHANGES = 0.01
+_CHANGES = 0.003
 """A factor that changes by less is not worth a word: by how much it jumps, or the root of its mean squared change."""
 
 _BEYOND_CHANCE = 4.0
