@@ -247,9 +247,13 @@ def test_words_of_a_plot_stand_apart_and_on_one_line(browser: Any, short: tuple[
         return bad;
     }"""
     for title in ("Stiffness K", "Natural frequency", "Torque, averaged over the test function", "Status over time"):
-        chart = "(title) => tvidentReport.charts.find((one) => one.about.title === title)"
-        opened.page.evaluate(f"{chart}.div.scrollIntoView()", title)
-        opened.page.wait_for_function(f"{chart}.isListening", arg=title)
+        # Plots above it that are drawn meanwhile may move it out of sight.
+        seen = """(title) => {
+            const chart = tvidentReport.charts.find((one) => one.about.title === title);
+            chart.div.scrollIntoView();
+            return chart.isListening;
+        }"""
+        opened.page.wait_for_function(seen, arg=title)
     opened.page.wait_for_selector(".annotation-text", state="attached")
     assert opened.ask(f"({overlapping})()") == []
     # The same time stands at the same place in every plot, that of the status too, whose names are in the page.
