@@ -287,7 +287,7 @@ mod tests {
 
     /// The angle of a rig whose stiffness swings, rounded, and its torque without noise.
     fn rounded() -> [Vec<f64>; 2] {
-        let [mut angle, mut torque] = [(); 2].map(|()| vec![0.0; SAMPLES]);
+        let [mut angle, mut torque] = [(); 2].map(|()| vec![0.0; SAMPLES / 2]);
         for (wave, phase) in random(7, 24).into_iter().enumerate() {
             let frequency = TAU * (0.5 + 0.5 * wave as f64);
             for (sample, (angle, torque)) in angle.iter_mut().zip(&mut torque).enumerate() {
