@@ -313,7 +313,6 @@ def test_what_is_held_stays_and_what_is_reset_begins_anew() -> None:
         ({"method": StrongForm(filter_torque=True), **WINDOWED}, "filter_torque=True"),
         ({"method": "paper", "lag": 0.002}, "got lag.*so many samples later"),
         ({"method": "paper", "period": 6.28}, "got period.*unwrap"),
-        ({"method": "paper", "nan_policy": "omit"}, "whole record"),
         ({"method": "paper", "terms": ("stribeck",)}, "built-in, without inner parameters"),
         ({"method": "paper", "half_life": 100}, "half_life is for constants"),
         ({"method": StrongForm(), "inertia": 1.0, "damping": 1.0, "stiffness": 1.0, "terms": ()}, "at least one"),

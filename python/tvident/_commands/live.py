@@ -74,6 +74,8 @@ def live(
         terms=terms_of(terms),
         lag=None if lag is None else lag_of(lag),  # type: ignore[arg-type] # refused with what to do instead
         half_life=None if half_life is None else length(half_life),
+        # A sample that does not come is no reason to say nothing.
+        nan_policy="omit",
         **others,
     )
     unknown = stream.units

@@ -166,11 +166,6 @@ def _windows(
     long, held = asked.long(quantisation), _held(channels, [span])
     if asked.given.nan_policy == "raise" and not held.is_whole:
         raise ValueError(f"samples {block[0]} to {block[1]} must be finite; some are not; use nan_policy='omit'")
-    if asked.given.nan_policy == "omit" and not held.is_whole:
-        begin = -(-span[0] // asked.step) * asked.step - span[0]
-        alone = Held(held.angle[begin:], held.torque[begin:], [(span[0] + begin, span[1])])
-        result = asked.given.identified(alone, step=asked.step)
-        return part_alone(result, alone.spans[0], block, asked.step)[0]
     return columns_of(long.windows(held, block, factors, 1))
 
 

@@ -5,8 +5,10 @@ from tvident._identify.criterion import aicc, effective_observations
 from tvident._identify.methods import Method, StrongForm, WeakForm
 from tvident._identify.parts import Held, Long, Rows, Span, estimate_part, identify_part, requested
 from tvident._identify.settings import Request, resolve
+from tvident._identify.weighted import MOST_OF_FIRST
 
 __all__ = [
+    "MOST_OF_FIRST",
     "Held",
     "Long",
     "Method",

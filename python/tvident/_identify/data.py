@@ -89,13 +89,9 @@ class Data:
             return None
         return [np.ascontiguousarray(one) for one in self.mask.reshape(-1, self.time.size)]
 
-    @property
-    def weights_of_core(self) -> npt.NDArray[np.float64] | None:
-        """The weights as the core asks for them."""
-        if self.weights is None:
-            return None
-        # The core is to know which samples are left out rather than missing.
-        return self.weights.values if self.propagate else self.weights.of_core
+    def weights_of_core(self, *, strong: bool) -> npt.NDArray[np.float64] | None:
+        """Return the weights as the core asks for them."""
+        return None if self.weights is None else self.weights.of_core(strong=strong, propagate=self.propagate)
 
     @property
     def records(self) -> int:

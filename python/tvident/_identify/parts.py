@@ -258,12 +258,12 @@ class Long(Task):
 
     def factors(self, held: Held, workers: int | None) -> list[float]:
         """Return by how much standard errors exceed those of independent equations, one factor an unknown."""
-        (factors,) = self._strong.scatter(self._of(held), workers=workers)
+        (factors,) = self._strong.scatter(self._of(held), propagate=self._propagate, workers=workers)
         return factors
 
     def rows(self, held: Held, wanted: Span, workers: int | None) -> Rows:
         """Return the triangular factor of the equations around some samples."""
-        return self._strong.rows(self._of(held), wanted, workers=workers)
+        return self._strong.rows(self._of(held), wanted, propagate=self._propagate, workers=workers)
 
     def values_known(self) -> dict[str, tuple[float, float]]:
         """Return what is known, with no error."""
@@ -283,7 +283,7 @@ class Long(Task):
         workers : int, optional
         """
         count = len(self._names)
-        found = self._strong.constants(self._of(held), rows, workers=workers)
+        found = self._strong.constants(self._of(held), rows, propagate=self._propagate, workers=workers)
         values, covariance = (
             ([np.nan] * count, [np.nan] * count**2) if found is None else (found.values, found.covariance)
         )

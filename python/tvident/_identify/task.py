@@ -114,7 +114,7 @@ class Task:
             angle_zero=self._angle_zeros(),
             quantisation=request.quantisation,
             masks=data.masks,
-            weights=data.weights_of_core,
+            weights=data.weights_of_core(strong=isinstance(request.form, StrongForm)),
             propagate=data.propagate,
             step=data.step,
             wanted=data.wanted,
@@ -284,7 +284,7 @@ class Task:
         assert isinstance(form, _core.StrongForm)  # noqa: S101 - weak form compares test functions of all widths while it identifies
         motions = self._motions(self.columns.samples(self._searched(None).values), scanned=True)
         kinds, lags = [one.kind for one in self._unknowns], [late or 0.0 for late in self._lags()]
-        weights = data.weights_of_core
+        weights = data.weights_of_core(strong=True)
         found = form.scan(motions, kinds, lag=lags, masks=data.masks, weights=weights, workers=data.workers)
         return tuple(scan_of(one, self._names) for one in found)
 

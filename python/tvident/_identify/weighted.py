@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,9 @@ from tvident import _arguments as arguments
 
 Array = npt.NDArray[np.float64]
 
+MOST_OF_FIRST: Final = 1e100
+"""Times the first weight of a recording that others may be: sums of squares stay within the range of doubles."""
+
 
 @dataclass(frozen=True)
 class Weights:
@@ -20,16 +24,50 @@ class Weights:
 
     Parameters
     ----------
-    values : ndarray, shape (\\*, n)
-        Their mean is one in every record, that of samples that count. A sample of weight zero is missing.
+    given : ndarray, shape (\\*, n)
+        In any unit, near one. A sample of weight zero is missing.
     """
 
-    values: Array
+    given: Array
+
+    @cached_property
+    def values(self) -> Array:
+        """Weights whose mean is one in every record, that of samples that count."""
+        counted = self.given > 0
+        with np.errstate(under="ignore"):
+            means = self.given.sum(axis=-1, keepdims=True) / np.maximum(counted.sum(axis=-1, keepdims=True), 1)
+            relative = self.given / np.where(means > 0, means, 1)
+        return np.where(self._alike & counted, 1.0, relative)
+
+    @cached_property
+    def of_first(self) -> Array:
+        """Weights over the first that is not zero, which a stream knows as well."""
+        place = np.argmax(self.given > 0, axis=-1, keepdims=True)
+        first = np.take_along_axis(self.given, place, axis=-1)
+        with np.errstate(under="ignore", over="ignore", divide="ignore", invalid="ignore"):
+            relative = self.given / np.where(first > 0, first, 1)
+        is_far = self.given.max(axis=-1, keepdims=True) > MOST_OF_FIRST * first
+        return np.where(is_far, self.values, relative)
 
     @property
-    def of_core(self) -> Array | None:
-        """The weights as the core asks for them; None where all are alike, which costs nothing and keeps every bit."""
-        return None if ((self.values == 1) | (self.values == 0)).all() else self.values
+    def _alike(self) -> npt.NDArray[np.bool_]:
+        """Of which records all weights are alike that are not zero."""
+        greatest = self.given.max(axis=-1, keepdims=True)
+        return np.asarray(np.where(self.given > 0, self.given, greatest).min(axis=-1, keepdims=True) == greatest)
+
+    def of_core(self, *, strong: bool, propagate: bool) -> Array | None:
+        """Return the weights as the core asks for them; None where all are alike, which costs nothing and keeps every bit.
+
+        Parameters
+        ----------
+        strong : bool
+            In strong form they have the bits that a stream gives them.
+        propagate : bool
+            The core is to know which samples are left out rather than missing.
+        """
+        if not propagate and self._alike.all():
+            return None
+        return np.ascontiguousarray(self.of_first if strong else self.values)
 
     @property
     def spread(self) -> list[float]:
@@ -39,7 +77,7 @@ class Weights:
 
     def part(self, place: Any) -> Weights:
         """Return those of some records."""
-        return Weights(self.values[place])
+        return Weights(self.given[place])
 
 
 def weights_of(given: npt.ArrayLike | None, shape: tuple[int, ...], beside: Mapping[str, Any]) -> Weights | None:
@@ -71,13 +109,7 @@ def weights_of(given: npt.ArrayLike | None, shape: tuple[int, ...], beside: Mapp
     found = np.broadcast_to(_checked(given, shape[-1:] if is_one else shape), shape)
     with np.errstate(under="ignore"):
         # Sums of weights may be beyond doubles: powers of two bring the greatest near one, without rounding.
-        found = np.ldexp(found, -np.frexp(found.max(axis=-1, keepdims=True))[1])
-        counted = found > 0
-        means = found.sum(axis=-1, keepdims=True) / np.maximum(counted.sum(axis=-1, keepdims=True), 1)
-        greatest = found.max(axis=-1, keepdims=True)
-        alike = np.where(counted, found, greatest).min(axis=-1, keepdims=True) == greatest
-        relative = found / np.where(means > 0, means, 1)
-    return Weights(np.ascontiguousarray(np.where(alike & counted, 1.0, relative)))
+        return Weights(np.ldexp(found, -np.frexp(found.max(axis=-1, keepdims=True))[1]))
 
 
 def usable_channels(
@@ -88,7 +120,7 @@ def usable_channels(
 ) -> tuple[dict[str, npt.NDArray[np.number]], npt.NDArray[np.number]]:
     """Return channels of the motion and the torque, what has no weight missing, with a policy for values that are missing anyway."""
     every = {**channels, "torque": torques}
-    counted = None if weights is None else weights.values > 0
+    counted = None if weights is None else weights.given > 0
     for name, samples in every.items():
         one = samples if counted is None else np.where(counted, samples, 0)
         arguments.check_nan(name, one, policy, arguments.RowPolicy)

@@ -142,7 +142,7 @@ class Run:
             if "factors" not in self._kept.facts:
                 held = asked.recording.held(long.spans_of_scatter())
                 self._kept.note_fact("factors", long.factors(held, asked.given.workers))
-            alone = None if asked.given.nan_policy == "propagate" else asked.in_pieces(None)
+            alone = asked.in_pieces(None) if asked.given.nan_policy == "raise" else None
             factors = self._kept.facts["factors"]
             return long.settings(factors), WindowsWork(
                 asked.recording, long, factors, alone, asked.step, asked.given.workers

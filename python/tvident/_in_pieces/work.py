@@ -45,7 +45,7 @@ class WindowsWork:
     factors : sequence of float
         Of standard errors, one an unknown.
     alone : Alone, optional
-        What is done with a piece in which samples are missing.
+        What is done with a piece in which samples are missing, where that is an error.
     step : int
     workers : int, optional
     """

@@ -32,8 +32,13 @@ class StreamWork(Protocol):
     def samples(self) -> int:
         """Samples that have come so far."""
 
-    def push(self, angle: npt.NDArray[np.number], torque: npt.NDArray[np.number]) -> Any:
-        """Take the next samples, and return the parameters that are due."""
+    def push(
+        self,
+        angle: npt.NDArray[np.number],
+        torque: npt.NDArray[np.number],
+        weights: npt.NDArray[np.float64] | None = None,
+    ) -> Any:
+        """Take the next samples, with weights if the stream has them, and return the parameters that are due."""
 
     def finish(self) -> Any:
         """Return the parameters of all samples that are left."""
@@ -83,7 +88,7 @@ class Asked(Protocol):
     def equation(self) -> Equation:
         """What is known and what is not."""
 
-    def begun(self, step: int, state: Any) -> StreamWork:
+    def begun(self, step: int, state: Any, *, weighted: bool = False) -> StreamWork:
         """Return the work that begins, or goes on from a state."""
 
 
@@ -101,6 +106,8 @@ class InStrongForm:
     factors : list of float, optional
         What standard errors of least squares are multiplied by, where an earlier result says.
     forgetting : float
+    leaves_out : bool
+        Missing samples are left out of windows, which otherwise have no number.
     """
 
     equation: Equation
@@ -108,8 +115,9 @@ class InStrongForm:
     regression_window: int | None
     factors: list[float] | None
     forgetting: float
+    leaves_out: bool
 
-    def begun(self, step: int, state: Any) -> StreamWork:
+    def begun(self, step: int, state: Any, *, weighted: bool = False) -> StreamWork:
         """Return the work that begins, or goes on from a state."""
         return _core.ParameterStream(
             plan(**self.plan),
@@ -119,6 +127,8 @@ class InStrongForm:
             step=step,
             factors=self.factors,
             forgetting=self.forgetting,
+            leaves_out=self.leaves_out,
+            weighted=weighted,
             state=state,
         )
 
@@ -139,8 +149,19 @@ class InWeakForm:
     given: Given
     half_life: float
 
-    def begun(self, step: int, state: Any) -> StreamWork:
-        """Return the work that begins, or goes on from a state."""
+    def begun(self, step: int, state: Any, *, weighted: bool = False) -> StreamWork:
+        """Return the work that begins, or goes on from a state.
+
+        Raises
+        ------
+        ValueError
+            If samples have weights.
+        """
+        if weighted:
+            raise ValueError(
+                "weights in a stream are for the strong form; got some in weak form, which goes by settings of an earlier result; give a "
+                "method of the strong form, or leave them out"
+            )
         return WeakStream(self.given, self.equation.names, step, self.half_life, state)
 
 
@@ -164,11 +185,6 @@ def asked_of(
         raise ValueError(
             f"the weak form chooses from the whole record; got {got} in a stream without settings to go by; {_CURE}, with method='auto', "
             "or a method of the strong form: 'paper' or a StrongForm"
-        )
-    if not is_weak and given.nan_policy == "omit":
-        raise ValueError(
-            "nan_policy must be 'propagate' or 'raise' in a stream of the strong form; got 'omit', which needs the whole record; use one "
-            "of these"
         )
     if (given.settings or {}).get("torque_readings") is True:
         raise ValueError(
@@ -217,6 +233,7 @@ def _in_strong_form(request: Request, equation: Equation, given: Given, half_lif
         regression_window=None if constant else rows,
         factors=[float(factors[name]) for name in names] if is_same and not constant else None,
         forgetting=0.5 ** (1 / half_life),
+        leaves_out=given.nan_policy == "omit",
     )
 
 

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident import _core
-from tvident._equation import COEFFICIENTS, LINEAR_UNITS, UNITS, GivenTerm, Parameter
-from tvident._identify import Method
+from tvident._equation import LINEAR_UNITS, UNITS, GivenTerm, Parameter
+from tvident._identify import MOST_OF_FIRST, Method
 from tvident._pieces import Given
-from tvident._status import DOUBTFUL, Status
-from tvident._stream.asked import Equation, StreamWork, asked_of
-from tvident._stream.pieces import SampleStream, is_plain, times
-from tvident._stream.weak import BlockParameters, WeakStream
+from tvident._status import Status
+from tvident._stream.asked import StreamWork, asked_of
+from tvident._stream.pieces import SampleStream, is_plain
+from tvident._stream.streamed import Named, StreamedIdentification
+from tvident._stream.weak import WeakStream
 from tvident._units import ROTARY, axis_of, factor_said, scaled
 
 Numbers = npt.NDArray[np.float64]
@@ -25,141 +26,11 @@ Numbers = npt.NDArray[np.float64]
 _NOTHING = np.empty(0)
 
 
-@dataclass(frozen=True)
-class Named:
-    """What turns numbers of a stream into results: one for all that it gives.
-
-    Parameters
-    ----------
-    equation : Equation
-    period, start : float
-        Seconds from one sample to the next, and the time of the first.
-    step : int
-        Samples from one result to the next.
-    """
-
-    equation: Equation
-    period: float
-    start: float
-    step: int
-
-
-class StreamedIdentification:
-    """What an :class:`IdentificationStream` gives for some samples, each with one element of every array.
-
-    Names are put on numbers once they are asked for: a sample that comes alone costs more in names than in arithmetic.
-
-    Attributes
-    ----------
-    time : ndarray of float64, shape (k,)
-        Times of the samples, in seconds.
-    values : mapping of str to ndarray, shape (k,)
-        Inertia, damping, stiffness and terms, unknown or known.
-    stderr : mapping of str to ndarray, shape (k,)
-        Their standard errors; NaN where none can be said yet.
-    residual_std, condition : ndarray of float64, shape (k,)
-    order : ndarray of uint8, shape (k,)
-    status : ndarray of uint16, shape (k,)
-        As in :class:`tvident.Identification`.
-    """
-
-    __slots__ = ("_found", "_named", "_stderr", "_time", "_values")
-
-    def __init__(self, found: BlockParameters | _core.StreamedParameters, named: Named) -> None:
-        self._found, self._named = found, named
-        # No cached properties: Python 3.11 locks them, which takes longer than what they hold.
-        self._time: Numbers | None = None
-        self._values: dict[str, Numbers] | None = None
-        self._stderr: dict[str, Numbers] | None = None
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        found = self._found
-        kept = BlockParameters(found.first, found.numbers, found.order, found.status)
-        return type(self), (kept, self._named)
-
-    def __repr__(self) -> str:
-        return f"<StreamedIdentification of {', '.join(self._named.equation.names)} at {self.status.size} samples>"
-
-    @property
-    def time(self) -> Numbers:
-        """Times of the samples, in seconds."""
-        if self._time is None:
-            named = self._named
-            self._time = times(self._found.first, self.status.size, named.step, named.period, named.start)
-        return self._time
-
-    @property
-    def values(self) -> Mapping[str, Numbers]:
-        """Inertia, damping, stiffness and terms, by name."""
-        if self._values is None:
-            equation = self._named.equation
-            self._values = dict(zip(equation.names, self._found.numbers, strict=False))
-            for name, known in equation.held:
-                self._values[name] = np.full(self.status.size, known)
-        return self._values
-
-    @property
-    def stderr(self) -> Mapping[str, Numbers]:
-        """Standard errors of the values, by name."""
-        if self._stderr is None:
-            equation = self._named.equation
-            self._stderr = dict(zip(equation.names, self._found.numbers[len(equation.names) :], strict=False))
-            for name, _ in equation.held:
-                self._stderr[name] = np.zeros(self.status.size)
-        return self._stderr
-
-    @property
-    def residual_std(self) -> Numbers:
-        """Standard deviation of the residuals, in N m."""
-        return np.asarray(self._found.numbers[-2])
-
-    @property
-    def condition(self) -> Numbers:
-        """Condition numbers of the equations."""
-        return np.asarray(self._found.numbers[-1])
-
-    @property
-    def order(self) -> npt.NDArray[np.uint8]:
-        """Orders of the polynomials."""
-        return self._found.order
-
-    @property
-    def status(self) -> npt.NDArray[np.uint16]:
-        """Flags: bits of :class:`tvident.Status`."""
-        return self._found.status
-
-    @property
-    def inertia(self) -> Numbers:
-        """Inertia, in kg m²."""
-        return self.values["inertia"]
-
-    @property
-    def damping(self) -> Numbers:
-        """Damping, in N m s/rad."""
-        return self.values["damping"]
-
-    @property
-    def stiffness(self) -> Numbers:
-        """Stiffness, in N m/rad."""
-        return self.values["stiffness"]
-
-    @property
-    def terms(self) -> dict[str, Numbers]:
-        """Factors of further terms, by name."""
-        return {name: value for name, value in self.values.items() if name not in COEFFICIENTS}
-
-    @property
-    def trusted(self) -> npt.NDArray[np.bool_]:
-        """Where there are numbers, and the status does not say that they are not to be trusted."""
-        there = np.all([np.isfinite(value) for value in self.values.values()], axis=0)
-        return np.asarray(there & (self.status & np.uint16(DOUBTFUL) == 0))
-
-
 class IdentificationStream(SampleStream[StreamedIdentification]):
     r"""Identify I, C and K in I θ̈ + C θ̇ + K θ = T while angle and torque are recorded: :func:`identify`, piece by piece.
 
-    Pieces may hold one sample or millions; memory does not grow with what has come. Parameters in windows have the bits of
-    ``identify(…, nan_policy="propagate")`` with all samples, however the stream is cut; those of a sample are given with the sample
+    Pieces may hold one sample or millions; memory does not grow with what has come. Parameters in windows of the strong form have the bits
+    of :func:`identify` with all samples and the same `nan_policy`, however the stream is cut; those of a sample are given with the sample
     :attr:`delay` samples later. Constants are given from all samples so far, or with older ones forgotten; after the last sample they are
     those of :func:`identify` to rounding.
 
@@ -184,7 +55,9 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
     quantisation : float, optional
         Step to which the angle was rounded; by default none.
     nan_policy : {"propagate", "raise", "omit"}, optional
-        Missing samples: windows that hold one are NaN, or an error. Constants leave their equations out. ``"omit"`` in weak form alone.
+        Missing samples: windows that hold one are NaN, or an error. Constants leave their equations out. With ``"omit"`` windows of
+        polynomials that hold short gaps are fitted on what is there, and equations that are missing are left out of their windows, as
+        :func:`identify` does.
     step : int, optional
         Every how many samples a result is wanted.
     settings : mapping, optional
@@ -199,7 +72,8 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
     delay : int
         Samples from one to its parameters. In strong form half a window of the polynomials, half of the span of windows that are
         reached from one start, and half a regression window where parameters are windowed. In weak form twice the sum of the window and
-        four regression windows, less one.
+        four regression windows, less one. With ``nan_policy="omit"`` or weights, samples within half a window of the polynomials and
+        the longest gap that is followed must have come.
     samples : int
         Samples that have come so far.
     names : list of str
@@ -316,6 +190,7 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         self._step = arguments.whole_number("step", step, least=1)
         self._start = arguments.finite_number("start", start)
         self._hold = False
+        self._weighted, self._unit = False, 0.0
         self._named = Named(self._asked.equation, self._period, self._start, self._step)
         # Whether an array of floats is taken as it is.
         self._plain = self._policy != "raise" and all(self._factor(name, _NOTHING) == 1 for name in ("angle", "torque"))
@@ -323,7 +198,7 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
 
     def _begun(self, state: Any) -> StreamWork:
         """Return a stream that begins, or goes on from a state."""
-        stream = self._asked.begun(self._step, state)
+        stream = self._asked.begun(self._step, state, weighted=self._weighted)
         stream.hold(self._hold)
         return stream
 
@@ -385,13 +260,18 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         """
         self._stream.reset()
 
-    def push(self, angle: npt.ArrayLike, torque: npt.ArrayLike) -> StreamedIdentification:
+    def push(
+        self, angle: npt.ArrayLike, torque: npt.ArrayLike, *, weights: npt.ArrayLike | None = None
+    ) -> StreamedIdentification:
         """Take the next samples, and give the parameters that they settle.
 
         Parameters
         ----------
         angle, torque : float or array_like, shape (m,)
             The next samples, any number of them.
+        weights : float or array_like, shape (m,), optional
+            Weight of every sample, one over the variance of its noise relative to the others, as in :func:`identify`; a sample of weight 0
+            is missing. In strong form; samples of a stream all have weights, or none has.
 
         Returns
         -------
@@ -401,7 +281,8 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         Raises
         ------
         ValueError
-            If the stream has ended, angle and torque have not the same length, or hold what is no number where `nan_policy` is ``"raise"``.
+            If the stream has ended, lengths differ, a channel holds what is no number where `nan_policy` is ``"raise"``, a weight is
+            negative, no finite number or 1e100 times the first, or only some samples have weights.
         TypeError
             If an array is complex or holds no numbers.
 
@@ -415,17 +296,57 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         Equations (1) to (9) of docs/mathematics.md, (A) of docs/automatic.md; the delay is explained in docs/real-time.md.
         """
         self._check_open()
+        if weights is not None or self._weighted:
+            return self._push_weighted(angle, torque, weights)
         if not (self._plain and is_plain(angle) and is_plain(torque)):
             angle, torque = self._channel("angle", angle), self._channel("torque", torque)
-        if angle.size != torque.size:
-            raise ValueError(
-                f"angle and torque must have as many samples as each other; got {angle.size} and {torque.size}; push them together"
-            )
+        _check_lengths(angle, torque)
         return StreamedIdentification(self._stream.push(angle, torque), self._named)
 
-    def _channel(self, name: Literal["angle", "torque"], values: Any) -> npt.NDArray[Any]:
-        """Return a piece of a channel in the units of the equation."""
-        return scaled(self._piece(name, values), self._factor(name, values))
+    def _push_weighted(self, angle: Any, torque: Any, weights: npt.ArrayLike | None) -> StreamedIdentification:
+        """Take the next samples with their weights."""
+        if weights is None or (not self._weighted and self.samples > 0):
+            raise ValueError(
+                f"samples of a stream must all have weights, or none of them; got some {'without' if weights is None else 'with'} after "
+                f"others {'with' if weights is None else 'without'}; give weights of 1 where all samples count the same"
+            )
+        # As many as the angle has samples.
+        count = np.size(angle)
+        given = arguments.some_weights("weights", weights, (count,))
+        if not self._weighted:
+            self._weighted = True
+            try:
+                self._stream = self._begun(None)
+            except ValueError:
+                self._weighted = False
+                raise
+        counted = given > 0
+        angle, torque = self._channel("angle", angle, counted), self._channel("torque", torque, counted)
+        _check_lengths(angle, torque)
+        relative = self._relative(given)
+        # What has no weight is missing.
+        angle, torque = (np.where(counted, channel, np.nan) for channel in (angle, torque))
+        return StreamedIdentification(self._stream.push(angle, torque, relative), self._named)
+
+    def _relative(self, weights: Numbers) -> Numbers:
+        """Return weights over the first that is not zero."""
+        if self._unit == 0.0 and weights.any():
+            self._unit = float(weights[np.argmax(weights > 0)])
+            self._named = replace(self._named, root=math.sqrt(self._unit))
+        largest = float(weights.max(initial=0.0))
+        if largest > MOST_OF_FIRST * self._unit:
+            raise ValueError(
+                f"weights of a stream must be at most {MOST_OF_FIRST:.0e} times the first that is not 0; got {largest:.3g} after "
+                f"{self._unit:.3g}; give all of them in one unit"
+            )
+        with np.errstate(under="ignore"):
+            return weights / (self._unit or 1.0)
+
+    def _channel(
+        self, name: Literal["angle", "torque"], values: Any, counted: npt.NDArray[np.bool_] | None = None
+    ) -> npt.NDArray[Any]:
+        """Return a piece of a channel in the units of the equation, of which only some samples may count."""
+        return scaled(self._piece(name, values, counted), self._factor(name, values))
 
     def _factor(self, name: Literal["angle", "torque"], values: Any) -> float:
         """Return what a piece is multiplied by: by the unit that was given, or else the one that it says."""
@@ -438,3 +359,11 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
     def __repr__(self) -> str:
         names = ", ".join(self._asked.equation.names)
         return f"<IdentificationStream of {names} after {self.samples} samples, {self._progress()}>"
+
+
+def _check_lengths(angle: npt.NDArray[Any], torque: npt.NDArray[Any]) -> None:
+    """Check that both channels have as many samples."""
+    if angle.size != torque.size:
+        raise ValueError(
+            f"angle and torque must have as many samples as each other; got {angle.size} and {torque.size}; push them together"
+        )

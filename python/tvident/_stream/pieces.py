@@ -107,8 +107,10 @@ class SampleStream(Stream[Out]):
         """
         return int(self._stream.samples)
 
-    def _piece(self, name: str, values: npt.ArrayLike) -> npt.NDArray[Any]:
-        """Return the next samples of a channel.
+    def _piece(
+        self, name: str, values: npt.ArrayLike, counted: npt.NDArray[np.bool_] | None = None
+    ) -> npt.NDArray[Any]:
+        """Return the next samples of a channel, of which only some may count.
 
         Raises
         ------
@@ -116,8 +118,11 @@ class SampleStream(Stream[Out]):
             If one is no number, and the policy says that this must not be.
         """
         samples = piece(name, values)
-        if self._policy == "raise" and samples.dtype.kind == "f" and not np.isfinite(samples).all():
-            place = int(np.flatnonzero(~np.isfinite(samples))[0])
+        if self._policy != "raise" or samples.dtype.kind != "f":
+            return samples
+        missing = ~np.isfinite(samples) if counted is None else ~np.isfinite(samples) & counted
+        if missing.any():
+            place = int(np.flatnonzero(missing)[0])
             raise ValueError(
                 f"{name} must hold finite numbers where nan_policy='raise'; sample {self.samples + place} is {samples[place]}; "
                 "repair it or use nan_policy='propagate'"

@@ -174,8 +174,14 @@ class WeakStream:
         held = self._buffer[:, first - self._begin : self._state.samples - self._begin].copy()
         return replace(self._state, first=first, held=held, gathered=replace(self._state.gathered))
 
-    def push(self, angle: npt.NDArray[np.number], torque: npt.NDArray[np.number]) -> BlockParameters:
+    def push(
+        self,
+        angle: npt.NDArray[np.number],
+        torque: npt.NDArray[np.number],
+        weights: npt.NDArray[np.float64] | None = None,
+    ) -> BlockParameters:
         """Take the next samples, and return the parameters that are due."""
+        assert weights is None  # noqa: S101 - a stream in weak form has none
         state, taken = self._state, 0
         found: list[Columns] = []
         while taken < angle.size:

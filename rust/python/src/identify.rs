@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use tvident::equation::Motion;
 use tvident::exec::workers as threads;
 use tvident::identify::{
-    Identification as Found, InstrumentTest, Kind, Method, Options, Repeated, StrongForm as Strong, Task,
+    Identification as Found, InstrumentTest, Kind, Method, Options, Repeated, StrongForm as Strong, StrongRecord, Task,
     WeakForm as Weak, around, constants_of_rows, identify_all, identify_with_instruments, parts_of_scatter,
     rows_of_part, scan_windows, scatter_of_windows,
 };
@@ -94,12 +94,18 @@ impl StrongForm {
     }
 
     /// By how much standard errors of windowed unknowns exceed those of ordinary least squares, for every record and unknown.
-    #[pyo3(signature = (motions, *, workers=None))]
-    fn scatter(&self, py: Python<'_>, motions: &Motions, workers: Option<NonZeroUsize>) -> PyResult<Vec<Vec<f64>>> {
-        let (form, motions) = (self.settings(), motions.all()?);
+    #[pyo3(signature = (motions, *, propagate=true, workers=None))]
+    fn scatter(
+        &self,
+        py: Python<'_>,
+        motions: &Motions,
+        propagate: bool,
+        workers: Option<NonZeroUsize>,
+    ) -> PyResult<Vec<Vec<f64>>> {
+        let (form, records) = (self.settings(), strong_records(motions, propagate)?);
         let mut factors = Vec::new();
         watched(py, None, |watch| {
-            let each = motions.iter().map(|motion| scatter_of_windows(&form, motion, threads(workers), watch));
+            let each = records.iter().map(|record| scatter_of_windows(&form, record, threads(workers), watch));
             factors = each.collect::<Result<_, _>>()?;
             Ok(())
         })?;
@@ -133,38 +139,40 @@ impl StrongForm {
     }
 
     /// The equations around some samples of one record.
-    #[pyo3(signature = (motions, wanted, *, workers=None))]
+    #[pyo3(signature = (motions, wanted, *, propagate=true, workers=None))]
     fn rows(
         &self,
         py: Python<'_>,
         motions: &Motions,
         wanted: (usize, usize),
+        propagate: bool,
         workers: Option<NonZeroUsize>,
     ) -> PyResult<FactoredRows> {
-        let (form, motions) = (self.settings(), motions.all()?);
-        let motion = motions.first().ok_or_else(|| PyValueError::new_err("there is no record"))?;
+        let (form, records) = (self.settings(), strong_records(motions, propagate)?);
+        let record = records.first().ok_or_else(|| PyValueError::new_err("there is no record"))?;
         let mut found = None;
         watched(py, None, |watch| {
-            found = Some(rows_of_part(&form, motion, wanted.0..wanted.1, threads(workers), watch)?);
+            found = Some(rows_of_part(&form, record, wanted.0..wanted.1, threads(workers), watch)?);
             Ok(())
         })?;
         found.as_ref().map(FactoredRows::of).ok_or_else(|| PyValueError::new_err("there are no rows"))
     }
 
     /// The constants that rows tell; None where they do not.
-    #[pyo3(signature = (motions, rows, *, workers=None))]
+    #[pyo3(signature = (motions, rows, *, propagate=true, workers=None))]
     fn constants(
         &self,
         py: Python<'_>,
         motions: &Motions,
         rows: &FactoredRows,
+        propagate: bool,
         workers: Option<NonZeroUsize>,
     ) -> PyResult<Option<ConstantsOfRows>> {
-        let (form, motions, rows) = (self.settings(), motions.all()?, rows.summary()?);
-        let motion = motions.first().ok_or_else(|| PyValueError::new_err("there is no record"))?;
+        let (form, records, rows) = (self.settings(), strong_records(motions, propagate)?, rows.summary()?);
+        let record = records.first().ok_or_else(|| PyValueError::new_err("there is no record"))?;
         let mut found = None;
         watched(py, None, |watch| {
-            found = constants_of_rows(&form, motion, &rows, threads(workers), watch)?;
+            found = constants_of_rows(&form, record, &rows, threads(workers), watch)?;
             Ok(())
         })?;
         Ok(found.map(|found| ConstantsOfRows {
@@ -174,6 +182,12 @@ impl StrongForm {
             condition: found.condition,
         }))
     }
+}
+
+/// The records of which parts are looked at: missing samples are left out of them, or spoil their windows.
+fn strong_records(motions: &Motions, propagate: bool) -> PyResult<Vec<StrongRecord<'_>>> {
+    let record = |motion| StrongRecord { motion, weights: None, leaves_out: !propagate };
+    Ok(motions.all()?.into_iter().map(record).collect())
 }
 
 /// The constants that rows tell, the covariance of these row by row, and what is left.

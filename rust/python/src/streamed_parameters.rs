@@ -11,8 +11,8 @@ use tvident::least_squares::Regressions;
 use tvident::local_polynomials::LocalPolynomials as Plan;
 use tvident::record::Samples;
 use tvident::stream::{
-    ConstantState, ConstantStream, Parameters, PolynomialState, RollingState, RowsState, StreamedMotion, WindowedState,
-    WindowedStream,
+    ConstantState, ConstantStream, NextSamples, Parameters, PolynomialState, RollingState, RowsState, StreamedMotion,
+    StreamedSamples, WindowedState, WindowedStream,
 };
 
 use crate::arrays::{rows, zeros};
@@ -61,14 +61,18 @@ macro_rules! either {
 pub(crate) struct ParameterStream {
     plan: Arc<Plan>,
     unknowns: usize,
+    weighted: bool,
     stream: Stream,
 }
 
 #[pymethods]
 impl ParameterStream {
-    /// Constants where there is no regression window, which are forgotten by a factor at every row.
+    /// Constants where there is no regression window, which are forgotten by a factor at every row. Missing samples are left out, or spoil
+    /// their windows.
     #[new]
-    #[pyo3(signature = (plan, regression_window, known, terms, *, step=1, factors=None, forgetting=1.0, state=None))]
+    #[pyo3(signature = (
+        plan, regression_window, known, terms, *, step=1, factors=None, forgetting=1.0, leaves_out=false, weighted=false, state=None
+    ))]
     fn new(
         plan: &LocalPolynomials,
         regression_window: Option<usize>,
@@ -77,6 +81,8 @@ impl ParameterStream {
         step: usize,
         factors: Option<Vec<f64>>,
         forgetting: f64,
+        leaves_out: bool,
+        weighted: bool,
         state: Option<Stored<'_>>,
     ) -> PyResult<Self> {
         let named = |name: &String| {
@@ -84,6 +90,7 @@ impl ParameterStream {
         };
         let motion = StreamedMotion { known, terms: terms.iter().map(named).collect::<PyResult<_>>()? };
         let (unknowns, plan) = (motion.unknowns(), plan.shared());
+        let motion = (motion, StreamedSamples { leaves_out, weighted });
         let shared = Arc::clone(&plan);
         let stream = if let Some(rows) = regression_window {
             let state = state.as_ref().map_or(Ok(WindowedState::default()), windowed)?;
@@ -94,7 +101,7 @@ impl ParameterStream {
             let stream = ConstantStream::resume(shared, motion, step, forgetting, state);
             stream.map(|stream| Stream::Constant(Box::new(stream)))
         };
-        Ok(Self { plan, unknowns, stream: stream.map_err(|error| exception(&error))? })
+        Ok(Self { plan, unknowns, weighted, stream: stream.map_err(|error| exception(&error))? })
     }
 
     /// Samples from one to its parameters.
@@ -123,9 +130,9 @@ impl ParameterStream {
                 (rows, places.to_vec(), vec![sums, recent, factors])
             }
         };
-        let RowsState { angle, first, torque, marks } = rows;
-        let places = [angle.first, angle.given, usize::from(angle.ended), first];
-        let all = [angle.samples, torque, marks].into_iter().chain(columns);
+        let RowsState { angle, first, torque, first_weight, weights, marks } = rows;
+        let places = [angle.first, angle.given, usize::from(angle.ended), first, first_weight];
+        let all = [angle.samples, torque, weights, marks].into_iter().chain(columns);
         (places.into_iter().chain(whole).collect(), all.map(|column| PyArray1::from_vec(py, column)).collect())
     }
 
@@ -143,29 +150,37 @@ impl ParameterStream {
         }
     }
 
-    /// Takes in samples and returns the parameters that they settle.
+    /// Takes in samples, with weights if the stream has them, and returns the parameters that they settle.
+    #[pyo3(signature = (angle, torque, weights=None))]
     fn push<'py>(
         &mut self,
         angle: &Bound<'py, PyUntypedArray>,
         torque: &Bound<'py, PyUntypedArray>,
+        weights: Option<&Bound<'py, PyUntypedArray>>,
     ) -> PyResult<StreamedParameters> {
         let py = angle.py();
-        let (angle, torque) = (one(angle)?, one(torque)?);
-        let count = angle.len();
-        if torque.len() != count {
+        if weights.is_some() != self.weighted {
+            return Err(PyTypeError::new_err("samples of a stream all have weights, or none has"));
+        }
+        let channels = [Some(angle), Some(torque), weights].into_iter().flatten().map(one);
+        let channels = channels.collect::<PyResult<Vec<_>>>()?;
+        let count = channels[0].len();
+        if channels.iter().any(|channel| channel.len() != count) {
             return Err(PyValueError::new_err("angle and torque must have as many samples as each other"));
         }
         let given = either!(&self.stream, stream => stream.upcoming(count));
         let step = either!(&self.stream, stream => stream.step());
         let stream = &mut self.stream;
         outputs(py, self.unknowns, given, step, |parameters| {
-            let mut held = [Vec::new(), Vec::new()];
+            let mut held = [Vec::new(), Vec::new(), Vec::new()];
             in_pieces(py, count, |samples| {
-                for (held, channel) in held.iter_mut().zip([&angle, &torque]) {
+                for (held, channel) in held.iter_mut().zip(&channels) {
                     held.resize(samples.len(), 0.0);
                     channel.read(samples.start, held);
                 }
-                either!(stream, stream => stream.push(&held[0], &held[1], parameters));
+                let [angle, torque, weights] = &held;
+                let weights = (channels.len() > 2).then_some(&weights[..]);
+                either!(stream, stream => stream.push(NextSamples { angle, torque, weights }, parameters));
             })
         })
     }
@@ -190,14 +205,16 @@ fn numbers(column: Option<&PyReadonlyArray1<'_, f64>>) -> PyResult<Vec<f64>> {
 
 /// The part of a state that both kinds have, and the whole numbers of the rest.
 fn rows_of<'a>((whole, columns): &'a Stored<'_>) -> PyResult<(RowsState, &'a [usize])> {
-    let [first, given, ended, torque_first, rest @ ..] = &whole[..] else {
+    let [first, given, ended, torque_first, first_weight, rest @ ..] = &whole[..] else {
         return Err(PyTypeError::new_err("a stream resumes from what its state() returned"));
     };
     let state = RowsState {
         angle: PolynomialState { first: *first, samples: numbers(columns.first())?, given: *given, ended: *ended != 0 },
         first: *torque_first,
         torque: numbers(columns.get(1))?,
-        marks: numbers(columns.get(2))?,
+        first_weight: *first_weight,
+        weights: numbers(columns.get(2))?,
+        marks: numbers(columns.get(3))?,
     };
     Ok((state, rest))
 }
@@ -207,8 +224,8 @@ fn windowed(stored: &Stored<'_>) -> PyResult<WindowedState> {
     let (rows, &[first, given, ended, next, patience]) = rows_of(stored)? else {
         return Err(PyTypeError::new_err("windowed parameters resume from what their state() returned"));
     };
-    let windows = RollingState { first, rows: numbers(stored.1.get(3))?, given, ended: ended != 0 };
-    Ok(WindowedState { rows, windows, scatter: Some((next, patience, numbers(stored.1.get(4))?)) })
+    let windows = RollingState { first, rows: numbers(stored.1.get(4))?, given, ended: ended != 0 };
+    Ok(WindowedState { rows, windows, scatter: Some((next, patience, numbers(stored.1.get(5))?)) })
 }
 
 /// The state of constants.
@@ -219,9 +236,9 @@ fn constant(stored: &Stored<'_>) -> PyResult<ConstantState> {
     Ok(ConstantState {
         rows,
         places: [given, count, next, first],
-        sums: numbers(stored.1.get(3))?,
-        recent: numbers(stored.1.get(4))?,
-        factors: numbers(stored.1.get(5))?,
+        sums: numbers(stored.1.get(4))?,
+        recent: numbers(stored.1.get(5))?,
+        factors: numbers(stored.1.get(6))?,
     })
 }
 

@@ -28,6 +28,7 @@ pub use scanned::{Agreement, FEWEST_WIDTHS, OTHER_CONSTANT, Scan};
 pub use strong::constant::{constants_of_rows, rows_of_part};
 pub use strong::parts::{around, parts_of_scatter, scatter_of_windows};
 pub use strong::scan::scan_windows;
+pub use strong::streaming::StrongRecord;
 pub use weak::angle_zero::outcome::AngleZero;
 pub use weak::angle_zero::outcome::FreeOffset;
 pub use weak::friction::Sliding;

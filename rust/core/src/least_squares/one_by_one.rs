@@ -295,9 +295,14 @@ impl<H: Dimensions> OneByOneKernel<'_, '_, '_, H> {
         let bad = self.source.unusable().iter().filter(|row| self.run.rows.contains(row));
         places.extend(bad.filter_map(|row| (row + before).checked_sub(base)));
         let leaves_out = self.run.plan.at_least.is_some();
-        let (unusable, missing): (&[usize], &[usize]) = if leaves_out { (&[], &places) } else { (&places, &[]) };
+        let mut missing = if leaves_out { std::mem::take(&mut places) } else { Vec::new() };
+        if self.run.plan.spans_half() {
+            let without = self.source.without_weight().iter().filter(|row| self.run.rows.contains(row));
+            missing.extend(without.filter_map(|row| (row + before).checked_sub(base)));
+            missing.sort_unstable();
+        }
         let count = |window| counted(&self.run, self.source, window);
-        self.run.mark_windows(unusable, missing, count, self.outputs);
+        self.run.mark_windows(&places, &missing, count, self.outputs);
         self.state.unusable = places;
     }
 }

@@ -38,6 +38,15 @@ impl Alignment {
     }
 }
 
+/// What rows are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RowKind {
+    /// What a caller gives.
+    Any,
+    /// Equations of motion: windows must span half of their rows whatever is missing, and say so where they lack any.
+    Equations,
+}
+
 /// The plan of least squares with some regressors and right-hand sides in windows of some rows.
 #[derive(Clone, Debug)]
 pub struct RollingLeastSquares {
@@ -47,6 +56,8 @@ pub struct RollingLeastSquares {
     /// Rows that a window must hold, where those that are missing are left out; otherwise a missing row spoils its windows, and they must
     /// hold half of their rows.
     pub(crate) at_least: Option<usize>,
+    /// Whether rows are equations of motion.
+    pub(crate) rows_are: RowKind,
     /// Whether the residual of each window at its own row, and R², are wanted.
     pub(crate) fit: bool,
     /// Whether the inverse of every window's normal matrix is wanted: its diagonal in the place of the errors.
@@ -167,6 +178,7 @@ impl RollingLeastSquares {
             window,
             before: Alignment::Centre.before(window),
             at_least: None,
+            rows_are: RowKind::Any,
             fit: false,
             normal: false,
             fading: None,
@@ -177,6 +189,11 @@ impl RollingLeastSquares {
             ill_conditioned,
             instructions,
         })
+    }
+
+    /// Whether windows must span half of their rows whatever is missing, and say so where they lack any.
+    pub(crate) fn spans_half(&self) -> bool {
+        self.rows_are == RowKind::Equations
     }
 
     /// The same with windows that belong to another of their rows.
@@ -197,6 +214,14 @@ impl RollingLeastSquares {
     #[must_use]
     pub fn of_at_least(mut self, rows: usize) -> Self {
         self.at_least = Some(rows);
+        self
+    }
+
+    /// The same for equations of motion: windows lack rows near the ends of a record, down to half of them, and where some are missing or
+    /// have no weight. With `leaves_out` missing rows are left out; otherwise they spoil their windows.
+    #[must_use]
+    pub(crate) fn of_equations(mut self, leaves_out: bool) -> Self {
+        (self.rows_are, self.at_least) = (RowKind::Equations, leaves_out.then_some(0));
         self
     }
 

@@ -177,10 +177,11 @@ impl RollingRun<'_> {
 
     /// Flags windows with fewer rows, and invalidates those that have too few or hold an unusable value.
     pub(crate) fn mark(&self, scratch: &RollingScratch, full: bool, outputs: &mut Outputs<'_>) {
-        let RollingScratch { unusable, missing, .. } = scratch;
+        let RollingScratch { unusable, missing, left_out, .. } = scratch;
         if full && unusable.is_empty() {
             return;
         }
+        let missing = if self.plan.spans_half() { left_out } else { missing };
         let count = |window| if full { self.spanned(window) } else { self.count(&scratch.counts, window) };
         self.mark_windows(unusable, missing, count, outputs);
         self.forget_residuals(&scratch.left_out, outputs);
@@ -204,7 +205,8 @@ impl RollingRun<'_> {
             if is_among(missing, &mut next_missing, &rows) {
                 flags |= Status::GAP;
             }
-            let enough = plan.at_least.map_or(2 * spanned >= plan.window, |least| count >= least);
+            let spans_enough = 2 * spanned >= plan.window || (plan.at_least.is_some() && !plan.spans_half());
+            let enough = spans_enough && plan.at_least.is_none_or(|least| count >= least);
             if !enough || is_among(unusable, &mut next_unusable, &rows) {
                 outputs.invalidate(row..row + 1, flags | Status::INVALID);
             } else if count <= plan.regressors {

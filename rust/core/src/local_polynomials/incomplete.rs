@@ -113,7 +113,7 @@ impl LocalPolynomials {
     }
 
     /// The estimate at one sample.
-    fn incomplete(&self, record: &Incomplete<'_>, place: usize) -> IncompleteEstimate {
+    pub(crate) fn incomplete(&self, record: &Incomplete<'_>, place: usize) -> IncompleteEstimate {
         let (options, basis) = (self.options(), self.basis());
         let (length, wanted) = (basis.length(), options.derivatives.len());
         let next = record.parts.partition_point(|part| part.end <= place);

@@ -22,9 +22,8 @@ use crate::regression::newey_west::Stretched;
 use crate::simd::aligned::Aligned;
 use crate::simd::vectors::{Kernel, Lanes, dispatch};
 use crate::status::Status;
-use crate::stream::polynomials::PIECE;
 use crate::stream::rows::RecentRows;
-use crate::stream::windowed::{Parameters, RowsState, StreamedMotion, StreamedRows};
+use crate::stream::windowed::{NextSamples, Parameters, RowsState, StreamedMotion, StreamedRows, StreamedSamples};
 
 /// Rows that the correlation of residuals is read off, at most; half-windows of polynomials that they hold, at least.
 const MOST_ROWS: usize = 1 << 14;
@@ -62,6 +61,9 @@ pub struct ConstantStream {
     factors: Option<Vec<f64>>,
     tile: Tile,
     row: Vec<f64>,
+    /// Its weight, and the row times the root of that.
+    weight: f64,
+    weighted: Vec<f64>,
     wide: Aligned,
 }
 
@@ -88,7 +90,7 @@ impl ConstantStream {
     /// If the plan looks at neighbouring windows, or nothing or too much is unknown.
     pub fn resume(
         derivatives: Arc<LocalPolynomials>,
-        motion: StreamedMotion,
+        (motion, samples): (StreamedMotion, StreamedSamples),
         step: usize,
         forgetting: f64,
         state: ConstantState,
@@ -102,13 +104,15 @@ impl ConstantStream {
         let lanes = instructions.lanes();
         let size = Many { regressors: unknowns, rhs_count: 1 }.size();
         Ok(Self {
-            rows: StreamedRows::resume(derivatives, motion, &state.rows)?,
+            rows: StreamedRows::resume(derivatives, motion, samples, &state.rows)?,
             tile: Tile::new(Slots::of(&plan).fields(), 1, lanes),
             recent: RecentRows::new(unknowns + 1, first_recent, state.recent),
             sums: Recursion { factor: factor.to_vec(), weights, count },
             next: next.max(LEAST_HALVES * reach.max(1)),
             factors: Some(state.factors).filter(|factors| !factors.is_empty()),
             row: vec![0.0; unknowns + 1],
+            weight: 1.0,
+            weighted: Vec::new(),
             wide: Aligned::zeros(size * lanes),
             hold: false,
             plan,
@@ -177,9 +181,9 @@ impl ConstantStream {
     }
 
     /// Takes in samples and gives the constants after each row of [`ConstantStream::upcoming`].
-    pub fn push(&mut self, angle: &[f64], torque: &[f64], parameters: &mut Parameters<'_>) {
-        for (angle, torque) in angle.chunks(PIECE).zip(torque.chunks(PIECE)) {
-            let ready = self.rows.take(Some((&angle, &torque)));
+    pub fn push(&mut self, channels: NextSamples<'_>, parameters: &mut Parameters<'_>) {
+        for piece in channels.pieces() {
+            let ready = self.rows.take(Some(piece));
             self.sum_up(ready, usize::MAX, parameters);
         }
     }
@@ -205,7 +209,10 @@ impl ConstantStream {
             for (value, column) in self.row.iter_mut().zip(&self.rows.columns) {
                 *value = column[place];
             }
-            let is_equation = (self.first..end).contains(&sample) && self.row.iter().all(|value| is_usable(*value));
+            self.weight = self.rows.row_weights.get(place).copied().unwrap_or(1.0);
+            let is_equation = self.weight > 0.0
+                && (self.first..end).contains(&sample)
+                && self.row.iter().all(|value| is_usable(*value));
             let adds = is_equation && !self.hold;
             let wanted = elements.of(sample..sample + 1);
             self.advance(adds, !wanted.is_empty());
@@ -236,7 +243,10 @@ impl ConstantStream {
             let [one, two] = &mut self.sums.weights;
             (*one, *two) = (*one * self.forgetting + 1.0, *two * self.forgetting * self.forgetting + 1.0);
             self.sums.count += 1;
-            self.recent.extend(1, self.row.chunks(1));
+            let root = self.weight.sqrt();
+            self.weighted.clear();
+            self.weighted.extend(self.row.iter().map(|value| value * root));
+            self.recent.extend(1, self.weighted.chunks(1));
             let kept = self.kept();
             self.recent.forget_before(self.recent.len().saturating_sub(kept));
         }
@@ -247,7 +257,7 @@ impl ConstantStream {
             plan: &self.plan,
             factor: &mut self.sums.factor,
             wide: &mut self.wide,
-            row: adds.then_some(&self.row),
+            row: adds.then_some((&self.row, self.weight)),
             forgetting: self.forgetting,
             freedom: wanted.then_some(freedom),
             tile: &mut self.tile,
@@ -297,7 +307,8 @@ struct Advance<'a> {
     plan: &'a RollingLeastSquares,
     factor: &'a mut Vec<f64>,
     wide: &'a mut Aligned,
-    row: Option<&'a Vec<f64>>,
+    /// Its numbers and its weight.
+    row: Option<(&'a Vec<f64>, f64)>,
     forgetting: f64,
     freedom: Option<f64>,
     tile: &'a mut Tile,
@@ -315,7 +326,7 @@ impl Kernel for Advance<'_> {
             factor[place] = simd.splat_f64s(*value);
         }
         let mut scratch = shape.factor(simd.splat_f64s(0.0));
-        if let Some(row) = self.row {
+        if let Some((row, weight)) = self.row {
             if self.forgetting < 1.0 {
                 let forgetting = simd.splat_f64s(self.forgetting);
                 for place in (0..=unknowns).map(|i| shape.row(i)) {
@@ -325,7 +336,7 @@ impl Kernel for Advance<'_> {
             for (column, value) in row.iter().enumerate() {
                 scratch[column] = simd.splat_f64s(*value);
             }
-            append(simd, shape, &mut factor, &mut scratch, 0, simd.splat_f64s(1.0));
+            append(simd, shape, &mut factor, &mut scratch, 0, simd.splat_f64s(weight));
             store(simd, shape, self.wide, &factor);
             self.factor.clear();
             self.factor.extend(self.wide.iter().step_by(S::F64_LANES));

@@ -9,4 +9,6 @@ pub(crate) mod windowed;
 pub use constants::{ConstantState, ConstantStream};
 pub use polynomials::{PolynomialState, PolynomialStream};
 pub use rolling::{RollingState, RollingStream};
-pub use windowed::{Parameters, RowsState, StreamedMotion, WindowedState, WindowedStream};
+pub use windowed::{
+    NextSamples, Parameters, RowsState, StreamedMotion, StreamedSamples, WindowedState, WindowedStream,
+};

@@ -33,6 +33,8 @@ pub struct PolynomialStream {
     plan: Arc<LocalPolynomials>,
     step: usize,
     errors: bool,
+    /// Neighbours on either side of a sample that must be there when its estimate is given.
+    neighbours: usize,
     record: Retained,
     /// Samples whose estimates were made, and those that were given.
     made: usize,
@@ -83,6 +85,7 @@ impl PolynomialStream {
         let mut stream = Self {
             step,
             errors,
+            neighbours: 0,
             record: Retained::new(state.first, state.samples),
             made: state.given,
             given: state.given,
@@ -98,10 +101,26 @@ impl PolynomialStream {
         Ok(stream)
     }
 
+    /// The same with neighbours of samples that must be there when their estimates are given, which come later for it.
+    pub(crate) fn with_neighbours(mut self, neighbours: usize) -> Self {
+        self.neighbours = neighbours;
+        self
+    }
+
+    /// The samples that are held: those around the latest that were given are among them.
+    pub(crate) fn record(&self) -> &Retained {
+        &self.record
+    }
+
+    /// The first sample that is still needed.
+    fn needed_from(&self) -> usize {
+        self.plan.reads_from(self.given).min(self.given.saturating_sub(self.neighbours))
+    }
+
     /// The state to resume from.
     #[must_use]
     pub fn state(&self) -> PolynomialState {
-        let (first, samples) = self.record.from(self.plan.reads_from(self.given));
+        let (first, samples) = self.record.from(self.needed_from());
         PolynomialState { first, samples: samples.to_vec(), given: self.given, ended: self.ended }
     }
 
@@ -109,7 +128,7 @@ impl PolynomialStream {
     /// is full.
     #[must_use]
     pub fn delay(&self) -> usize {
-        self.plan.lookahead()
+        self.plan.lookahead().max(self.neighbours)
     }
 
     /// Samples taken in so far.
@@ -122,7 +141,7 @@ impl PolynomialStream {
     #[must_use]
     pub fn upcoming(&self, count: usize) -> Range<usize> {
         let samples = self.record.len() + count;
-        let ready = if samples < self.plan.options().window_length { 0 } else { samples - self.delay() };
+        let ready = if samples < self.plan.options().window_length { 0 } else { samples.saturating_sub(self.delay()) };
         self.given..ready.max(self.given)
     }
 
@@ -139,6 +158,7 @@ impl PolynomialStream {
         let mut from = 0;
         while from < samples.len() {
             let count = PIECE.min(samples.len() - from);
+            self.record.forget_before(self.needed_from());
             self.record.read_from(samples, from, count);
             from += count;
             let settled = self.plan.settled(self.record.len());
@@ -147,7 +167,6 @@ impl PolynomialStream {
             }
             let ready = self.upcoming(0);
             self.give(ready, estimates, errors);
-            self.record.forget_before(self.plan.reads_from(self.given));
         }
     }
 

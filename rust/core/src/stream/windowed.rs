@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::equation::motion::{Coefficient, Measured, Motion, Term};
 use crate::equation::terms::BuiltInTerm;
 use crate::error::Error;
+use crate::identify::strong::beside_gaps::{BesideGaps, reach};
 use crate::identify::strong::scatter::Scattering;
 use crate::identify::strong::streaming::equations;
 use crate::lanes::output::Elements;
@@ -56,17 +57,62 @@ pub struct Parameters<'a> {
     pub order: &'a mut [u8],
 }
 
+/// What is done about samples that are missing, or count more or less than others.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StreamedSamples {
+    /// Missing samples are left out, rather than spoil their windows.
+    pub leaves_out: bool,
+    /// Every sample comes with a weight: one over the variance of its noise, relative to the others. Samples of weight zero must be missing.
+    pub weighted: bool,
+}
+
+impl StreamedSamples {
+    /// Whether windows that lack samples are fitted on what is there.
+    fn fits_beside_gaps(self) -> bool {
+        self.leaves_out || self.weighted
+    }
+}
+
+/// The next samples of a stream.
+#[derive(Clone, Copy, Debug)]
+pub struct NextSamples<'a> {
+    /// All of the same length.
+    pub angle: &'a [f64],
+    /// In the unit of the equation.
+    pub torque: &'a [f64],
+    /// Where the stream has weights.
+    pub weights: Option<&'a [f64]>,
+}
+
+impl<'a> NextSamples<'a> {
+    /// Pieces of them.
+    pub(crate) fn pieces(self) -> impl Iterator<Item = NextSamples<'a>> {
+        (0..self.angle.len()).step_by(PIECE).map(move |first| {
+            let piece = |channel: &'a [f64]| &channel[first..channel.len().min(first + PIECE)];
+            NextSamples { angle: piece(self.angle), torque: piece(self.torque), weights: self.weights.map(piece) }
+        })
+    }
+}
+
 /// Rows of a recording that comes piece by piece: its angle differentiated, the equation of motion at every sample.
 #[derive(Debug)]
 pub(crate) struct StreamedRows {
+    derivatives_of: Arc<LocalPolynomials>,
     motion: StreamedMotion,
+    samples: StreamedSamples,
     pub(crate) angle: PolynomialStream,
     pub(crate) torque: Retained,
+    /// Of the latest samples, where they have any.
+    weights: Retained,
+    beside_gaps: BesideGaps,
     /// Of the latest samples, until their windows are given.
     pub(crate) marks: Marks,
     derivatives: [Vec<f64>; 3],
     known: Vec<f64>,
+    /// Unknowns, then the right-hand side.
     pub(crate) columns: Vec<Vec<f64>>,
+    /// Of the rows in `columns`, where there are any.
+    pub(crate) row_weights: Vec<f64>,
 }
 
 /// Orders and flags of the latest samples.
@@ -120,13 +166,21 @@ impl StreamedRows {
     pub(crate) fn resume(
         derivatives: Arc<LocalPolynomials>,
         motion: StreamedMotion,
+        samples: StreamedSamples,
         state: &RowsState,
     ) -> Result<Self, Error> {
         let columns = vec![Vec::new(); motion.unknowns() + 1];
+        let neighbours = if samples.fits_beside_gaps() { reach(&derivatives) } else { 0 };
+        let angle = PolynomialStream::resume(Arc::clone(&derivatives), 1, false, state.angle.clone())?;
         Ok(Self {
+            derivatives_of: derivatives,
             motion,
-            angle: PolynomialStream::resume(derivatives, 1, false, state.angle.clone())?,
+            samples,
+            angle: angle.with_neighbours(neighbours),
             torque: Retained::new(state.first, state.torque.clone()),
+            weights: Retained::new(state.first_weight, state.weights.clone()),
+            beside_gaps: BesideGaps::default(),
+            row_weights: Vec::new(),
             marks: Marks::resume(&state.marks),
             derivatives: Default::default(),
             known: Vec::new(),
@@ -136,16 +190,39 @@ impl StreamedRows {
 
     /// What it resumes from, where windows before `given` were given.
     pub(crate) fn state(&self, given: usize) -> RowsState {
-        let (first, torque) = self.torque.from(self.angle.at_end().start);
-        RowsState { angle: self.angle.state(), first, torque: torque.to_vec(), marks: self.marks.state(given) }
+        let next = self.angle.at_end().start;
+        let (first, torque) = self.torque.from(next);
+        let (first_weight, weights) = self.weights.from(self.weights_from(next));
+        RowsState {
+            angle: self.angle.state(),
+            first,
+            torque: torque.to_vec(),
+            first_weight,
+            weights: weights.to_vec(),
+            marks: self.marks.state(given),
+        }
+    }
+
+    /// The columns of the rows, with the weights where there are any.
+    fn all_columns(&self) -> impl Iterator<Item = &[f64]> {
+        let weights = self.samples.weighted.then_some(&self.row_weights);
+        self.columns.iter().chain(weights).map(Vec::as_slice)
+    }
+
+    /// The first weight that rows from one on need.
+    fn weights_from(&self, row: usize) -> usize {
+        row.saturating_sub(reach(&self.derivatives_of))
     }
 
     /// Takes in a piece, or ends where there is none. Returns the samples whose rows are in `columns` now.
-    pub(crate) fn take(&mut self, piece: Option<(&dyn Samples, &dyn Samples)>) -> Range<usize> {
-        if let Some((_, torque)) = piece {
-            self.torque.read_from(torque, 0, torque.len());
+    pub(crate) fn take(&mut self, piece: Option<NextSamples<'_>>) -> Range<usize> {
+        if let Some(NextSamples { torque, weights, .. }) = piece {
+            self.torque.read_from(&torque, 0, torque.len());
+            if let Some(weights) = weights {
+                self.weights.read_from(&weights, 0, weights.len());
+            }
         }
-        let ready = piece.map_or_else(|| self.angle.at_end(), |(angle, _)| self.angle.upcoming(angle.len()));
+        let ready = piece.map_or_else(|| self.angle.at_end(), |piece| self.angle.upcoming(piece.angle.len()));
         let motion = self.motion.with(&self.torque);
         motion.take_back(&mut self.derivatives, &mut self.columns);
         self.derivatives.iter_mut().for_each(|derivative| derivative.resize(ready.len(), 0.0));
@@ -160,11 +237,23 @@ impl StreamedRows {
             sigma: &mut [],
         };
         match piece {
-            Some((angle, _)) => self.angle.push(angle, &mut estimates, &mut []),
+            Some(NextSamples { angle, .. }) => self.angle.push(&angle, &mut estimates, &mut []),
             None => self.angle.finish(&mut estimates, &mut []),
+        }
+        let StreamedSamples { leaves_out, weighted } = self.samples;
+        if self.samples.fits_beside_gaps() && self.angle.samples() >= self.derivatives_of.options().window_length {
+            // As the batch has it.
+            let weights = (!leaves_out).then_some(&self.weights as &dyn Samples);
+            let channels = (self.angle.record() as &dyn Samples, weights);
+            self.beside_gaps.fit(&self.derivatives_of, channels, ready.clone(), &mut estimates, &|| true);
+        }
+        if weighted {
+            self.row_weights.resize(ready.len(), 0.0);
+            self.weights.read(ready.start, &mut self.row_weights);
         }
         motion.rows(ready.start, &mut self.derivatives, &mut self.known, &mut self.columns);
         self.torque.forget_before(ready.end);
+        self.weights.forget_before(self.weights_from(ready.end));
         ready
     }
 }
@@ -178,6 +267,10 @@ pub struct RowsState {
     pub first: usize,
     /// The latest samples of the torque.
     pub torque: Vec<f64>,
+    /// Number of the first sample in `weights`.
+    pub first_weight: usize,
+    /// The latest weights, where there are any.
+    pub weights: Vec<f64>,
     /// Orders and flags of the latest samples.
     pub marks: Vec<f64>,
 }
@@ -215,7 +308,7 @@ impl WindowedStream {
     pub fn resume(
         derivatives: Arc<LocalPolynomials>,
         regression_window: usize,
-        motion: StreamedMotion,
+        (motion, samples): (StreamedMotion, StreamedSamples),
         step: usize,
         factors: Option<Vec<f64>>,
         state: WindowedState,
@@ -223,14 +316,20 @@ impl WindowedStream {
         let (unknowns, instructions) = (motion.unknowns(), derivatives.options().instructions);
         let plan =
             RollingLeastSquares::new(regression_window, unknowns, 1, Vec::new(), HARDLY_TOLD_APART, instructions)?;
+        let plan = plan.of_equations(samples.leaves_out);
         let mut scattering = Scattering::new(&derivatives, regression_window, unknowns);
         if let Some((next, patience, numbers)) = &state.scatter {
             scattering.resume((*next, *patience, numbers));
         }
         let first = derivatives.before_centre();
+        let windows = if samples.weighted {
+            RollingStream::weighted(plan, step, state.windows)?
+        } else {
+            RollingStream::resume(plan, step, state.windows)?
+        };
         Ok(Self {
-            rows: StreamedRows::resume(derivatives, motion, &state.rows)?,
-            windows: RollingStream::resume(plan, step, state.windows)?.with_equations_from(first),
+            rows: StreamedRows::resume(derivatives, motion, samples, &state.rows)?,
+            windows: windows.with_equations_from(first),
             step,
             factors,
             scattering,
@@ -271,12 +370,11 @@ impl WindowedStream {
     }
 
     /// Takes in samples and gives the parameters of [`WindowedStream::upcoming`], to elements that begin with the first of them.
-    pub fn push(&mut self, angle: &[f64], torque: &[f64], parameters: &mut Parameters<'_>) {
-        for (angle, torque) in angle.chunks(PIECE).zip(torque.chunks(PIECE)) {
-            let ready = self.rows.take(Some((&angle, &torque)));
+    pub fn push(&mut self, channels: NextSamples<'_>, parameters: &mut Parameters<'_>) {
+        for piece in channels.pieces() {
+            let ready = self.rows.take(Some(piece));
             let around = self.windows.upcoming(ready.len());
-            let columns = self.rows.columns.iter().map(Vec::as_slice);
-            self.windows.push_rows(ready.len(), columns, &mut parameters.regressions);
+            self.windows.push_rows(ready.len(), self.rows.all_columns(), &mut parameters.regressions);
             self.complete(around.clone(), around.end, parameters);
         }
     }
@@ -284,7 +382,7 @@ impl WindowedStream {
     /// Ends the stream and gives the parameters of [`WindowedStream::at_end`].
     pub fn finish(&mut self, derivatives: &LocalPolynomials, parameters: &mut Parameters<'_>) {
         let ready = self.rows.take(None);
-        self.windows.append(ready.len(), self.rows.columns.iter().map(Vec::as_slice));
+        self.windows.append(ready.len(), self.rows.all_columns());
         let around = self.windows.at_end();
         let end = equations(derivatives, self.samples()).end;
         self.windows.finish_with(end, &mut parameters.regressions);

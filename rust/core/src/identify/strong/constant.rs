@@ -8,10 +8,12 @@ use crate::equation::motion::{Motion, unknowns};
 use crate::error::Error;
 use crate::exec::huge_pages::zeros;
 use crate::exec::pool;
-use crate::exec::pool::{Piece, Watch};
+use crate::exec::pool::{GoOn, Piece, Watch};
 use crate::identify::identification::{Covariance, Identification, Unknown};
 use crate::identify::options::StrongForm;
-use crate::identify::strong::streaming::{Chunk, Identified, PIECE, equations, finish, pairs, variance_inflations};
+use crate::identify::strong::streaming::{
+    Chunk, Identified, PIECE, StrongRecord, equations, finish, pairs, variance_inflations,
+};
 use crate::lanes::output::Elements;
 use crate::least_squares::plan::Regressions;
 use crate::least_squares::stacked_qr::{SharedParameters, Summary};
@@ -33,14 +35,15 @@ const NOWHERE: Elements = Elements { first: 0, step: 1 };
 /// If a record is shorter than the window of the polynomials, or the watch cancels.
 pub(crate) fn identify_constant(
     derivatives: &LocalPolynomials,
-    records: Vec<(Motion<'_>, Identified<'_>)>,
+    records: Vec<(&StrongRecord<'_>, Identified<'_>)>,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<Option<SharedParameters>>, Error> {
-    let motions: Vec<Motion<'_>> = records.iter().map(|(motion, _)| motion.clone()).collect();
-    let records = records.into_iter().map(|(motion, identified)| (0..motion.angle.len(), identified)).collect();
-    let totals = summaries(derivatives, &motions, records, workers, watch)?;
-    solved(derivatives, &motions, &totals, workers, watch)
+    let all: Vec<&StrongRecord<'_>> = records.iter().map(|(record, _)| *record).collect();
+    let every = |(record, identified): (&StrongRecord<'_>, _)| (0..record.motion.angle.len(), identified);
+    let outputs = records.into_iter().map(every).collect();
+    let totals = summaries(derivatives, &all, outputs, workers, watch)?;
+    solved(derivatives, &all, &totals, workers, watch)
 }
 
 /// The summary of the rows of some samples of every record. Of the outputs, which belong to these samples, only orders and statuses are written.
@@ -49,41 +52,42 @@ pub(crate) fn identify_constant(
 /// As [`identify_constant`].
 pub(crate) fn summaries(
     derivatives: &LocalPolynomials,
-    motions: &[Motion<'_>],
-    records: Vec<(Range<usize>, Identified<'_>)>,
+    records: &[&StrongRecord<'_>],
+    outputs: Vec<(Range<usize>, Identified<'_>)>,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<Summary>, Error> {
-    let unknowns = motions.first().map_or(0, Motion::unknowns);
+    let unknowns = records.first().map_or(0, |record| record.motion.unknowns());
     let mut pieces = Vec::new();
     let mut owners = Vec::new();
-    for (index, (motion, (wanted, mut identified))) in motions.iter().zip(records).enumerate() {
-        derivatives.windows(motion.angle.len())?;
+    for (index, (&record, (wanted, mut identified))) in records.iter().zip(outputs).enumerate() {
+        derivatives.windows(record.motion.angle.len())?;
         for first in (wanted.start - wanted.start % PIECE..wanted.end).step_by(PIECE) {
             let samples = first.max(wanted.start)..wanted.end.min(first + PIECE);
             let part = identified.split_off_before(samples.end);
-            pieces.push(Piece { size: samples.len(), content: (pieces.len(), motion, samples, part) });
+            pieces.push(Piece { size: samples.len(), content: (pieces.len(), record, samples, part) });
             owners.push(index);
         }
     }
     let summaries = Mutex::new(vec![None; pieces.len()]);
     let failed = Mutex::new(None);
-    let work = |(place, motion, samples, mut part): (usize, &Motion<'_>, Range<usize>, Identified<'_>),
-                chunk: &mut Chunk| {
-        if let Err(error) = chunk.fill(derivatives, motion, samples.clone()) {
+    let work = |(place, record, samples, mut part): (usize, &StrongRecord<'_>, Range<usize>, Identified<'_>),
+                chunk: &mut Chunk,
+                go_on: &GoOn<'_>| {
+        if let Err(error) = chunk.fill(derivatives, record, samples.clone(), go_on) {
             *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
             return;
         }
-        let rows = equations(derivatives, motion.angle.len());
+        let rows = equations(derivatives, record.motion.angle.len());
         let summary = Summary::of(&chunk.columns, |row| chunk.is_equation(row, &rows));
         finish(chunk, samples, &mut part);
         summaries.lock().unwrap_or_else(PoisonError::into_inner)[place] = Some(summary);
     };
-    pool::run(pieces, workers, || Chunk::new(derivatives, unknowns + 1), work, watch)?;
+    pool::run_long(pieces, workers, || Chunk::new(derivatives, unknowns + 1), work, watch)?;
     if let Some(error) = failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
         return Err(error);
     }
-    let mut totals = vec![Summary::empty(unknowns + 1); motions.len()];
+    let mut totals = vec![Summary::empty(unknowns + 1); records.len()];
     for (summary, owner) in summaries.into_inner().unwrap_or_else(PoisonError::into_inner).iter().zip(owners) {
         if let Some(summary) = summary {
             totals[owner].add(summary);
@@ -99,16 +103,15 @@ pub(crate) fn summaries(
 /// If the record is shorter than the window of the polynomials, or the watch cancels.
 pub fn rows_of_part(
     form: &StrongForm<'_>,
-    motion: &Motion<'_>,
+    record: &StrongRecord<'_>,
     wanted: Range<usize>,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Summary, Error> {
     let nowhere =
         Identified { regressions: Regressions { elements: NOWHERE, ..Regressions::default() }, order: &mut [] };
-    let motions = [motion.clone()];
-    let mut found = summaries(form.derivatives, &motions, vec![(wanted, nowhere)], workers, watch)?;
-    Ok(found.pop().unwrap_or_else(|| Summary::empty(motion.unknowns() + 1)))
+    let mut found = summaries(form.derivatives, &[record], vec![(wanted, nowhere)], workers, watch)?;
+    Ok(found.pop().unwrap_or_else(|| Summary::empty(record.motion.unknowns() + 1)))
 }
 
 /// The constants that the rows of a record tell, with the correlation of neighbouring rows in their standard errors. Of the record only
@@ -118,34 +121,33 @@ pub fn rows_of_part(
 /// If the record is shorter than the window of the polynomials, or the watch cancels.
 pub fn constants_of_rows(
     form: &StrongForm<'_>,
-    motion: &Motion<'_>,
+    record: &StrongRecord<'_>,
     rows: &Summary,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Option<SharedParameters>, Error> {
-    let motions = std::slice::from_ref(motion);
-    let solved = solved(form.derivatives, motions, std::slice::from_ref(rows), workers, watch)?;
+    let solved = solved(form.derivatives, &[record], std::slice::from_ref(rows), workers, watch)?;
     Ok(solved.into_iter().next().flatten())
 }
 
 /// The constants of every record, with the correlation of neighbouring rows in their standard errors.
 fn solved(
     derivatives: &LocalPolynomials,
-    motions: &[Motion<'_>],
+    records: &[&StrongRecord<'_>],
     totals: &[Summary],
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<Option<SharedParameters>>, Error> {
     let mut solved: Vec<_> = totals.iter().map(Summary::solve).collect();
-    let pieces = solved.iter_mut().zip(motions).map(|content| Piece { size: 1, content }).collect();
-    let work = |(solved, motion): (&mut Option<SharedParameters>, &Motion<'_>), chunk: &mut Chunk| {
+    let pieces = solved.iter_mut().zip(records).map(|content| Piece { size: 1, content }).collect();
+    let work = |(solved, record): (&mut Option<SharedParameters>, &&StrongRecord<'_>), chunk: &mut Chunk| {
         if let Some(solved) = solved {
-            enlarge(&mut solved.covariance, &variance_inflations(derivatives, motion, chunk)?);
+            enlarge(&mut solved.covariance, &variance_inflations(derivatives, record, chunk)?);
         }
         Ok(())
     };
-    let samples = motions.iter().map(|motion| motion.angle.len()).sum();
-    let columns = motions.first().map_or(0, Motion::unknowns) + 1;
+    let samples = records.iter().map(|record| record.motion.angle.len()).sum();
+    let columns = records.first().map_or(0, |record| record.motion.unknowns()) + 1;
     let chunk = || Chunk::new(derivatives, columns);
     let done: Result<(), Error> =
         pool::map(pieces, workers, chunk, work, &mut |_, _| watch(samples, samples))?.into_iter().collect();
@@ -158,24 +160,25 @@ fn solved(
 /// If a record is shorter than the window of the polynomials, or the watch cancels.
 pub(crate) fn constants(
     form: &StrongForm<'_>,
-    motions: &[Motion<'_>],
+    all: &[StrongRecord<'_>],
     step: usize,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<Identification>, Error> {
     let elements = Elements { first: 0, step };
-    let wanted = |motion: &Motion<'_>| motion.angle.len().div_ceil(step);
-    let mut outputs: Vec<(Vec<u8>, Vec<u16>)> = motions
-        .iter()
-        .map(|motion| Ok((zeros(wanted(motion))?, zeros(wanted(motion))?)))
-        .collect::<Result<_, Error>>()?;
-    let records = motions.iter().zip(&mut outputs).map(|(motion, (order, status))| {
+    let wanted = |record: &StrongRecord<'_>| record.motion.angle.len().div_ceil(step);
+    let mut outputs: Vec<(Vec<u8>, Vec<u16>)> =
+        all.iter().map(|record| Ok((zeros(wanted(record))?, zeros(wanted(record))?))).collect::<Result<_, Error>>()?;
+    let records = all.iter().zip(&mut outputs).map(|(record, (order, status))| {
         let regressions = Regressions { elements, status, ..Regressions::default() };
-        (motion.clone(), Identified { regressions, order })
+        (record, Identified { regressions, order })
     });
     let solved = identify_constant(form.derivatives, records.collect(), workers, watch)?;
-    let found = motions.iter().zip(solved).zip(outputs);
-    Ok(found.map(|((motion, solved), (order, status))| identification(form, motion, solved, order, status)).collect())
+    let found = all.iter().zip(solved).zip(outputs);
+    let one = |((record, solved), (order, status)): ((&StrongRecord<'_>, _), _)| {
+        identification(form, &record.motion, solved, order, status)
+    };
+    Ok(found.map(one).collect())
 }
 
 /// What was found of one record.

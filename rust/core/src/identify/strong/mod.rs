@@ -1,5 +1,6 @@
 //! Identification in strong form: one row per sample, from estimated derivatives.
 
+pub(crate) mod beside_gaps;
 pub(crate) mod constant;
 pub(crate) mod general;
 pub(crate) mod parts;

@@ -5,14 +5,11 @@
 use std::num::NonZeroUsize;
 use std::ops::Range;
 
-use crate::equation::motion::Motion;
 use crate::error::Error;
 use crate::exec::pool::Watch;
 use crate::identify::options::StrongForm;
 use crate::identify::strong::scatter::{compared_windows, identify_with_scatter};
-use crate::identify::strong::streaming::{Identified, rows_of_variance_inflations};
-use crate::least_squares::plan::RollingLeastSquares;
-use crate::regression::limits::HARDLY_TOLD_APART;
+use crate::identify::strong::streaming::{Identified, StrongRecord, rows_of_variance_inflations};
 
 /// Windows of polynomials that lie between a sample and the farthest one that has a part in its derivatives: half of its own, the neighbours that
 /// orders are pooled over, and the span that reaches it, which is no longer than a window.
@@ -50,20 +47,12 @@ pub fn parts_of_scatter(form: &StrongForm<'_>, samples: usize) -> Vec<Range<usiz
 /// If the record is shorter than the window of the polynomials, windows are impossible, or the watch cancels.
 pub fn scatter_of_windows(
     form: &StrongForm<'_>,
-    motion: &Motion<'_>,
+    record: &StrongRecord<'_>,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<f64>, Error> {
-    let instructions = form.derivatives.options().instructions;
-    let least_squares = RollingLeastSquares::new(
-        form.regression_window,
-        motion.unknowns(),
-        1,
-        Vec::new(),
-        HARDLY_TOLD_APART,
-        instructions,
-    )?;
-    let nowhere = vec![(motion.clone(), 0..0, Identified::default())];
+    let least_squares = record.windows(form.derivatives, form.regression_window, Vec::new())?;
+    let nowhere = vec![(record, 0..0, Identified::default())];
     let mut factors = identify_with_scatter(form.derivatives, &least_squares, nowhere, workers, watch)?;
     Ok(factors.pop().unwrap_or_default())
 }

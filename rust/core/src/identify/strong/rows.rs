@@ -1,23 +1,17 @@
 //! Rows of the strong form, one per sample, from derivatives of local polynomials.
 
-use std::ops::Range;
-
 use crate::equation::motion::{Coefficient, Measured, Motion, Term};
 use crate::equation::rows::{Regressor, Rows};
 use crate::equation::terms::{BuiltInTerm, TermFunction, signs};
 use crate::error::Error;
 use crate::exec::stages::Stages;
+use crate::identify::strong::beside_gaps::fit_whole;
 use crate::lanes::output::Elements;
 use crate::local_polynomials::estimates::Estimates;
-use crate::local_polynomials::incomplete::Incomplete;
 use crate::local_polynomials::options::{Order, PolynomialOptions};
 use crate::local_polynomials::plan::LocalPolynomials;
 use crate::record::delayed::Delayed;
 use crate::record::samples::{Samples, is_usable};
-use crate::status::Status;
-
-/// Windows with gaps that are fitted before their estimates are put into columns: what is kept of each takes some hundred bytes.
-const TOGETHER: usize = 1 << 14;
 
 /// The angle and its derivatives, the torque without its lag, and what the polynomials say.
 pub(crate) struct Differentiated {
@@ -53,7 +47,7 @@ pub(crate) fn differentiate(
         plan.run(&[motion.angle], estimates, true, workers, watch)
     })?;
     let Differentiated { derivatives, order, status, .. } = &mut found;
-    fit_beside_gaps(
+    fit_whole(
         plan,
         &whole(motion.angle),
         derivatives,
@@ -95,7 +89,7 @@ fn take_measured(
             };
             plan.run(&[channel], estimates, true, workers, watch)
         })?;
-        fit_beside_gaps(plan, &whole(channel), &mut own, |_| true, stages, |_, _, _| {})?;
+        fit_whole(plan, &whole(channel), &mut own, |_| true, stages, |_, _, _| {})?;
         derivatives[derivative..].iter_mut().zip(own).for_each(|(column, own)| *column = own);
     }
     Ok(())
@@ -130,72 +124,11 @@ fn smooth_torque(
         })?;
         let orders_of_angle = &found.order;
         let is_own = |sample: usize| orders_of_angle[sample] == order;
-        fit_beside_gaps(&fixed, &recorded, &mut smoothed, is_own, stages, |_, _, _| {})?;
+        fit_whole(&fixed, &recorded, &mut smoothed, is_own, stages, |_, _, _| {})?;
         let own = found.torque.iter_mut().zip(&smoothed[0]).zip(&found.order);
         own.filter(|(_, one)| **one == order).for_each(|((torque, smooth), _)| *torque = *smooth);
     }
     Ok(())
-}
-
-/// Fits the windows that lack samples on what is there, around samples that are wanted, and puts their derivatives into their places; `take` gets
-/// the order and the flags of each.
-///
-/// Gaps are followed that are no longer than the part of a window that a coefficient of its highest order stands for. Near a longer gap
-/// there are no equations, as near the ends of a record; nor is there one of a sample that is missing.
-fn fit_beside_gaps(
-    plan: &LocalPolynomials,
-    samples: &[f64],
-    derivatives: &mut [Vec<f64>],
-    is_wanted: impl Fn(usize) -> bool,
-    stages: &mut Stages<'_, '_>,
-    mut take: impl FnMut(usize, u8, u16),
-) -> Result<(), Error> {
-    let (length, before) = (plan.options().window_length, plan.before_centre());
-    let parts = parts_between_gaps(samples, length / plan.orders().max(2));
-    let mut places = Vec::new();
-    for part in &parts {
-        let centres = part.start + before..(part.end + before + 1).saturating_sub(length).max(part.start + before);
-        // Missing samples of the window that ends with a sample.
-        let mut lost = 0_usize;
-        let is_lost = |sample: usize| usize::from(!is_usable(samples[sample]));
-        for sample in part.start..part.end {
-            lost += is_lost(sample);
-            lost -= sample.checked_sub(length).filter(|gone| *gone >= part.start).map_or(0, is_lost);
-            let centre = (sample + before + 1).saturating_sub(length);
-            let is_there = centres.contains(&centre) && is_usable(samples[centre]);
-            if lost > 0 && is_there && is_wanted(centre) {
-                places.push(centre);
-            }
-        }
-    }
-    if places.is_empty() {
-        return Ok(());
-    }
-    let record = Incomplete { samples, weights: None, parts: &parts, least: length.div_ceil(2) };
-    let workers = stages.workers;
-    for places in places.chunks(TOGETHER) {
-        let found = stages.stage(|watch| plan.run_incomplete(&record, places, workers, watch))?;
-        for (&place, estimate) in places.iter().zip(found) {
-            for (column, (value, _)) in derivatives.iter_mut().zip(&estimate.derivatives) {
-                column[place] = *value;
-            }
-            // A sample that is there is no gap, though its window has one.
-            take(place, u8::try_from(estimate.order).unwrap_or(u8::MAX), estimate.status.bits() & !Status::GAP.bits());
-        }
-    }
-    Ok(())
-}
-
-/// The parts of a record between gaps that are longer than some samples.
-fn parts_between_gaps(samples: &[f64], longest: usize) -> Vec<Range<usize>> {
-    let mut parts: Vec<Range<usize>> = Vec::new();
-    for sample in (0..samples.len()).filter(|&sample| is_usable(samples[sample])) {
-        match parts.last_mut() {
-            Some(part) if sample - part.end <= longest => part.end = sample + 1,
-            _ => parts.push(sample..sample + 1),
-        }
-    }
-    parts
 }
 
 /// One row a sample, with the weight of that sample.

@@ -8,10 +8,11 @@
 use std::num::NonZeroUsize;
 use std::ops::Range;
 
-use crate::equation::motion::Motion;
 use crate::error::Error;
 use crate::exec::pool::Watch;
-use crate::identify::strong::streaming::{Chunk, Identified, equations, identify_parts, variance_inflations};
+use crate::identify::strong::streaming::{
+    Chunk, Identified, StrongRecord, equations, identify_parts, variance_inflations,
+};
 use crate::lanes::output::Elements;
 use crate::least_squares::plan::{Regressions, RollingLeastSquares};
 use crate::local_polynomials::plan::LocalPolynomials;
@@ -48,12 +49,12 @@ pub(crate) struct Track<'a> {
 pub(crate) fn scatter(
     derivatives: &LocalPolynomials,
     least_squares: &RollingLeastSquares,
-    records: &[(Motion<'_>, Track<'_>)],
+    records: &[(&StrongRecord<'_>, Track<'_>)],
 ) -> Result<Vec<Vec<f64>>, Error> {
     let mut all = Vec::new();
-    for (motion, track) in records {
-        let factors = scatter_of(derivatives, least_squares.window(), motion.angle.len(), *track);
-        all.push(or_variance_inflations(factors, derivatives, least_squares, motion)?);
+    for (record, track) in records {
+        let factors = scatter_of(derivatives, least_squares.window(), record.motion.angle.len(), *track);
+        all.push(or_variance_inflations(factors, derivatives, least_squares, record)?);
     }
     Ok(all)
 }
@@ -66,31 +67,27 @@ pub(crate) fn scatter(
 pub(crate) fn identify_with_scatter(
     derivatives: &LocalPolynomials,
     least_squares: &RollingLeastSquares,
-    records: Vec<(Motion<'_>, Range<usize>, Identified<'_>)>,
+    records: Vec<(&StrongRecord<'_>, Range<usize>, Identified<'_>)>,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<Vec<f64>>, Error> {
-    let mut motions = Vec::new();
-    let mut outputs = Vec::new();
-    for (motion, wanted, identified) in records {
-        motions.push(motion);
-        outputs.push((wanted, identified));
-    }
-    let taken = |motion: &Motion<'_>| -> Vec<Taken> {
+    let taken = |record: &StrongRecord<'_>| -> Vec<Taken> {
+        let motion = &record.motion;
         let compared = Compared::new(derivatives, least_squares.window(), motion.angle.len());
         let stretches = compared.stretches().into_iter();
         stretches.map(|around| Taken::empty(motion.unknowns(), around, &compared)).collect()
     };
-    let mut taken: Vec<Vec<Taken>> = motions.iter().map(taken).collect();
+    let all: Vec<&StrongRecord<'_>> = records.iter().map(|(record, ..)| *record).collect();
+    let mut taken: Vec<Vec<Taken>> = all.iter().map(|record| taken(record)).collect();
     let mut parts = Vec::new();
-    for ((motion, identified), taken) in motions.iter().zip(outputs).zip(&mut taken) {
-        parts.push((motion, identified));
-        parts.extend(taken.iter_mut().map(|taken| (motion, (taken.around.clone(), taken.outputs()))));
+    for ((record, wanted, identified), taken) in records.into_iter().zip(&mut taken) {
+        parts.push((record, (wanted, identified)));
+        parts.extend(taken.iter_mut().map(|taken| (record, (taken.around.clone(), taken.outputs()))));
     }
     identify_parts(derivatives, least_squares, parts, workers, watch)?;
-    let each = motions.iter().zip(taken);
-    each.map(|(motion, taken)| {
-        or_variance_inflations(factors(motion.unknowns(), taken), derivatives, least_squares, motion)
+    let each = all.into_iter().zip(taken);
+    each.map(|(record, taken)| {
+        or_variance_inflations(factors(record.motion.unknowns(), taken), derivatives, least_squares, record)
     })
     .collect()
 }
@@ -100,11 +97,11 @@ fn or_variance_inflations(
     factors: Option<Vec<f64>>,
     derivatives: &LocalPolynomials,
     least_squares: &RollingLeastSquares,
-    motion: &Motion<'_>,
+    record: &StrongRecord<'_>,
 ) -> Result<Vec<f64>, Error> {
     match factors {
         Some(factors) => Ok(factors),
-        None => variance_inflations(derivatives, motion, &mut Chunk::new(derivatives, least_squares.columns())),
+        None => variance_inflations(derivatives, record, &mut Chunk::new(derivatives, least_squares.columns())),
     }
 }
 

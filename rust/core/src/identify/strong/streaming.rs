@@ -8,6 +8,7 @@ use crate::equation::motion::Motion;
 use crate::error::Error;
 use crate::exec::pool;
 use crate::exec::pool::{GoOn, Piece, Watch};
+use crate::identify::strong::beside_gaps::BesideGaps;
 use crate::lanes::output::{Elements, split_off};
 use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares};
 use crate::local_polynomials::estimates::Estimates;
@@ -15,6 +16,7 @@ use crate::local_polynomials::order_shares::Wanted;
 use crate::local_polynomials::plan::LocalPolynomials;
 use crate::record::samples::{Samples, is_usable};
 use crate::record::subsample::stretches;
+use crate::regression::limits::HARDLY_TOLD_APART;
 use crate::regression::newey_west::Stretched;
 use crate::status::Status;
 
@@ -24,6 +26,32 @@ pub(crate) const PIECE: usize = 1 << 14;
 /// Rows that the correlation of residuals is read off in a long record, and in how many stretches.
 const MOST_ROWS: usize = 1 << 14;
 const STRETCHES: usize = 8;
+
+/// A record in strong form that is worked on piece by piece.
+#[derive(Clone)]
+pub struct StrongRecord<'a> {
+    /// Its equation of motion.
+    pub motion: Motion<'a>,
+    /// One over the variance of every sample's noise, relative to the others; all alike if `None`.
+    pub weights: Option<&'a [f64]>,
+    /// Whether windows that lack samples are solved from the others, rather than given no number.
+    pub leaves_out: bool,
+}
+
+impl StrongRecord<'_> {
+    /// The plan of windows of its equations.
+    pub(crate) fn windows(
+        &self,
+        derivatives: &LocalPolynomials,
+        window: usize,
+        covariances: Vec<(usize, usize)>,
+    ) -> Result<RollingLeastSquares, Error> {
+        let instructions = derivatives.options().instructions;
+        let unknowns = self.motion.unknowns();
+        let plan = RollingLeastSquares::new(window, unknowns, 1, covariances, HARDLY_TOLD_APART, instructions)?;
+        Ok(plan.of_equations(self.leaves_out))
+    }
+}
 
 /// Where results of one record are written. An empty slice stands for what is not wanted.
 #[derive(Debug, Default)]
@@ -52,6 +80,7 @@ pub(crate) struct Chunk {
     /// Unknowns, then the right-hand side.
     pub(crate) columns: Vec<Vec<f64>>,
     polynomials: crate::local_polynomials::plan::PolynomialScratch,
+    beside_gaps: BesideGaps,
 }
 
 /// One column of a chunk, known by absolute sample numbers. Beyond the chunk, where no window that is wanted reaches, it is zero.
@@ -85,16 +114,19 @@ impl Chunk {
             known: Vec::new(),
             columns: vec![Vec::new(); columns],
             polynomials: plan.scratch(),
+            beside_gaps: BesideGaps::default(),
         }
     }
 
-    /// Differentiates the angle at some samples and builds their rows.
+    /// Differentiates the angle at some samples and builds their rows. What is there is of no use once `go_on` has returned false.
     pub(crate) fn fill(
         &mut self,
         plan: &LocalPolynomials,
-        motion: &Motion<'_>,
+        record: &StrongRecord<'_>,
         samples: Range<usize>,
+        go_on: &GoOn<'_>,
     ) -> Result<(), Error> {
+        let motion = &record.motion;
         self.first = samples.start;
         motion.take_back(&mut self.derivatives, &mut self.columns);
         for derivative in &mut self.derivatives {
@@ -109,7 +141,13 @@ impl Chunk {
             status: &mut self.status,
             sigma: &mut [],
         };
-        plan.estimate(motion.angle, samples, &mut estimates, &mut self.polynomials)?;
+        plan.estimate(motion.angle, samples.clone(), &mut estimates, &mut self.polynomials)?;
+        if record.leaves_out || record.weights.is_some() {
+            // Without weight a sample may be missing; others spoil their windows, unless those are left out.
+            let weights = record.weights.as_ref().filter(|_| !record.leaves_out);
+            let channels = (motion.angle, weights.map(|weights| weights as &dyn Samples));
+            self.beside_gaps.fit(plan, channels, samples, &mut estimates, go_on);
+        }
         motion.rows(self.first, &mut self.derivatives, &mut self.known, &mut self.columns);
         Ok(())
     }
@@ -117,6 +155,13 @@ impl Chunk {
     /// The columns by the sample numbers of their record.
     pub(crate) fn columns(&self, samples: usize) -> Vec<Column<'_>> {
         self.columns.iter().map(|values| Column { first: self.first, values, samples }).collect()
+    }
+
+    /// Multiplies rows by the square roots of the weights of their samples.
+    fn weigh(&mut self, weights: &[f64]) {
+        for column in &mut self.columns {
+            column.iter_mut().zip(&weights[self.first..]).for_each(|(value, weight)| *value *= weight.sqrt());
+        }
     }
 
     /// Whether a row of the chunk is an equation, of those of the record, and can be used.
@@ -140,7 +185,7 @@ pub(crate) fn equations(plan: &LocalPolynomials, samples: usize) -> Range<usize>
 /// Identifies parameters in a window of equations around some samples of every record: (3) and (4) of the paper, in parallel over all records. All
 /// outputs belong to these samples.
 ///
-/// `derivatives` must be a plan for the value and the first two derivatives, `least_squares` one with the unknowns of the motions.
+/// `derivatives` must be a plan for the value and the first two derivatives, `least_squares` [`StrongRecord::windows`] of all of the records.
 /// Standard errors are those of ordinary least squares; [`scatter`](super::scatter::scatter()) says by what they are too small.
 ///
 /// # Errors
@@ -148,20 +193,21 @@ pub(crate) fn equations(plan: &LocalPolynomials, samples: usize) -> Range<usize>
 pub(crate) fn identify_parts(
     derivatives: &LocalPolynomials,
     least_squares: &RollingLeastSquares,
-    parts: Vec<(&Motion<'_>, (Range<usize>, Identified<'_>))>,
+    parts: Vec<(&StrongRecord<'_>, (Range<usize>, Identified<'_>))>,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<(), Error> {
     let mut pieces = Vec::new();
-    for (motion, (wanted, mut identified)) in parts {
-        derivatives.windows(motion.angle.len())?;
-        for samples in least_squares.pieces(motion.angle.len(), PIECE) {
+    for (record, (wanted, mut identified)) in parts {
+        let total = record.motion.angle.len();
+        derivatives.windows(total)?;
+        for samples in least_squares.pieces(total, PIECE) {
             let samples = samples.start.max(wanted.start)..samples.end.min(wanted.end);
             if samples.is_empty() {
                 continue;
             }
             let part = identified.split_off_before(samples.end);
-            pieces.push(Piece { size: samples.len(), content: (motion, samples, part) });
+            pieces.push(Piece { size: samples.len(), content: (record, samples, part) });
         }
     }
     let threads = workers.get().min(pieces.len());
@@ -169,19 +215,19 @@ pub(crate) fn identify_parts(
     least_squares.ask_for_scratch(threads)?;
     let scratch = || (Chunk::new(derivatives, least_squares.columns()), least_squares.scratch());
     let failed = Mutex::new(None);
-    let work = |(motion, samples, mut part): (&Motion<'_>, Range<usize>, Identified<'_>),
+    let work = |(record, samples, mut part): (&StrongRecord<'_>, Range<usize>, Identified<'_>),
                 (chunk, scratch): &mut (Chunk, crate::least_squares::side_by_side::RollingScratch),
                 go_on: &GoOn<'_>| {
-        let needed = least_squares.rows_needed(samples.clone(), motion.angle.len());
-        if let Err(error) = chunk.fill(derivatives, motion, needed) {
+        let total = record.motion.angle.len();
+        let needed = least_squares.rows_needed(samples.clone(), total);
+        if let Err(error) = chunk.fill(derivatives, record, needed, go_on) {
             *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
             return;
         }
-        let total = motion.angle.len();
         let columns = chunk.columns(total);
         let equations = Equations {
             columns: columns.iter().map(|column| column as &dyn Samples).collect(),
-            weights: None,
+            weights: record.weights.as_ref().map(|weights| weights as &dyn Samples),
             rows: equations(derivatives, total),
         };
         least_squares.solve_while(&equations, samples.clone(), &mut part.regressions, scratch, go_on);
@@ -223,13 +269,17 @@ pub(crate) fn rows_of_variance_inflations(
 /// By how much the standard errors of constants exceed those of ordinary least squares, from stretches of a long record.
 pub(crate) fn variance_inflations(
     derivatives: &LocalPolynomials,
-    motion: &Motion<'_>,
+    record: &StrongRecord<'_>,
     chunk: &mut Chunk,
 ) -> Result<Vec<f64>, Error> {
+    let motion = &record.motion;
     let rows = equations(derivatives, motion.angle.len());
     let mut stretched = Stretched::new(motion.unknowns() + 1, correlated(derivatives));
     for stretch in rows_of_variance_inflations(derivatives, motion.angle.len()) {
-        chunk.fill(derivatives, motion, stretch)?;
+        chunk.fill(derivatives, record, stretch, &|| true)?;
+        if let Some(weights) = record.weights {
+            chunk.weigh(weights);
+        }
         stretched.push(&chunk.columns, |row| chunk.is_equation(row, &rows));
     }
     Ok(stretched.factors().unwrap_or_else(|| vec![1.0; motion.unknowns()]))

@@ -2,17 +2,16 @@
 
 use std::num::NonZeroUsize;
 
-use crate::equation::motion::{Motion, unknowns as unknowns_of};
+use crate::equation::motion::unknowns as unknowns_of;
 use crate::error::Error;
 use crate::exec::huge_pages::zeros;
 use crate::exec::pool::Watch;
 use crate::identify::identification::{Covariance, Identification, Unknown};
 use crate::identify::options::{Options, StrongForm};
 use crate::identify::strong::scatter::{Track, identify_with_scatter, scatter, slices};
-use crate::identify::strong::streaming::{Identified, identify_parts, pairs};
+use crate::identify::strong::streaming::{Identified, StrongRecord, identify_parts, pairs};
 use crate::lanes::output::Elements;
-use crate::least_squares::plan::{Regressions, RollingLeastSquares};
-use crate::regression::limits::HARDLY_TOLD_APART;
+use crate::least_squares::plan::Regressions;
 use crate::status::Status;
 
 /// Numbers of every wanted sample of one record, in columns.
@@ -59,39 +58,39 @@ impl Columns {
     }
 }
 
-/// Identifies what is unknown in a window of equations around every sample of every record.
+/// Identifies what is unknown in a window of equations around every sample of every record. Of all records missing samples are left out, or of none.
 ///
 /// # Errors
 /// If a record is shorter than the window of the polynomials, or the watch cancels.
 pub(crate) fn windows(
     form: &StrongForm<'_>,
-    motions: &[Motion<'_>],
+    all: &[StrongRecord<'_>],
     options: &Options,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<Identification>, Error> {
-    let Some(first) = motions.first() else { return Ok(Vec::new()) };
-    let (derivatives, unknowns, pairs) = (form.derivatives, first.unknowns(), pairs(first));
-    let (rows, instructions) = (form.regression_window, derivatives.options().instructions);
-    let least_squares = RollingLeastSquares::new(rows, unknowns, 1, pairs.clone(), HARDLY_TOLD_APART, instructions)?;
+    let Some(one) = all.first() else { return Ok(Vec::new()) };
+    let (derivatives, rows, first) = (form.derivatives, form.regression_window, &one.motion);
+    let (unknowns, pairs) = (first.unknowns(), pairs(first));
+    let least_squares = one.windows(derivatives, rows, pairs.clone())?;
     let step = options.step;
-    let wanted = |motion: &Motion<'_>| options.wanted.clone().unwrap_or(0..motion.angle.len());
+    let wanted = |record: &StrongRecord<'_>| options.wanted.clone().unwrap_or(0..record.motion.angle.len());
     let elements =
         Elements { first: options.wanted.as_ref().map_or(0, |wanted| wanted.start.next_multiple_of(step)), step };
-    let empty = |motion: &Motion<'_>| Columns::new(unknowns, pairs.len(), elements.of(wanted(motion)).len());
-    let mut columns: Vec<Columns> = motions.iter().map(empty).collect::<Result<_, _>>()?;
+    let empty = |record: &StrongRecord<'_>| Columns::new(unknowns, pairs.len(), elements.of(wanted(record)).len());
+    let mut columns: Vec<Columns> = all.iter().map(empty).collect::<Result<_, _>>()?;
     let outputs = columns.iter_mut().map(|columns| columns.outputs(elements));
-    let records: Vec<_> = motions.iter().zip(outputs).map(|(motion, out)| (motion, (wanted(motion), out))).collect();
+    let records: Vec<_> = all.iter().zip(outputs).map(|(record, out)| (record, (wanted(record), out))).collect();
     let factors = if options.wanted.is_some() {
         identify_parts(derivatives, &least_squares, records, workers, watch)?;
-        vec![vec![1.0; unknowns]; motions.len()]
+        vec![vec![1.0; unknowns]; all.len()]
     } else if step == 1 {
         identify_parts(derivatives, &least_squares, records, workers, watch)?;
         let found: Vec<_> = columns.iter().map(|columns| (slices(&columns.values), slices(&columns.stderr))).collect();
         let tracks = found.iter().map(|(values, errors)| Track { values, errors });
-        scatter(derivatives, &least_squares, &motions.iter().cloned().zip(tracks).collect::<Vec<_>>())?
+        scatter(derivatives, &least_squares, &all.iter().zip(tracks).collect::<Vec<_>>())?
     } else {
-        let records = records.into_iter().map(|(motion, (wanted, out))| (motion.clone(), wanted, out)).collect();
+        let records = records.into_iter().map(|(record, (wanted, out))| (record, wanted, out)).collect();
         identify_with_scatter(derivatives, &least_squares, records, workers, watch)?
     };
     let numbers = unknowns_of(&first.coefficients, first.terms.len());
