@@ -47,7 +47,7 @@ from tvident._core_stubs.noise import (
     spike_counts,
     unread_counts,
 )
-from tvident._core_stubs.regression import RollingRegressions, rolling_least_squares
+from tvident._core_stubs.regression import RollingRegressions, rolling_least_squares, rows_within
 from tvident._core_stubs.response import Modes, Responses, modes, respond
 from tvident._core_stubs.streams import (
     ParameterStream,
@@ -125,6 +125,7 @@ __all__ = [
     "quantisation_step",
     "respond",
     "rolling_least_squares",
+    "rows_within",
     "sliding_velocity",
     "spike_counts",
     "status_flags",

@@ -219,15 +219,20 @@ def test_residuals_are_those_of_what_was_given() -> None:
     alignment=st.sampled_from(["centre", "trailing", "leading"]),
     jitter=st.sampled_from([0.05, 0.5, 3.0]),
     least=st.sampled_from([None, 4, 12]),
+    n=st.sampled_from([60, 150, 900]),
+    p=st.sampled_from([1, 2, 6, 10]),
+    lost=st.sampled_from([0.0, 0.03]),
 )
 def test_windows_of_a_duration_hold_the_rows_within(
-    seed: int, alignment: Alignment, jitter: float, least: int | None
+    seed: int, alignment: Alignment, jitter: float, least: int | None, n: int, p: int, lost: float
 ) -> None:
     generator = np.random.default_rng(seed)
-    n, duration = 150, 20.0
+    duration = 20.0
     t = np.cumsum(1 + jitter * generator.random(n))
-    A, b = generator.standard_normal((n, 2)), generator.standard_normal(n)
-    asked = least if jitter < 1 else None
+    A, b = generator.standard_normal((n, p)), generator.standard_normal(n)
+    missing = generator.random(n) < lost
+    b[missing] = np.nan
+    asked = max(least, p + 1) if least is not None and jitter < 1 else None
     found = tvident.rolling_least_squares(A, b, "20 s", t=t, alignment=alignment, min_observations=asked)
     before = {"centre": duration / 2, "trailing": duration, "leading": 0.0}[alignment]
     for row in {0, n - 1, *generator.integers(n, size=30).tolist()}:
@@ -243,7 +248,10 @@ def test_windows_of_a_duration_hold_the_rows_within(
         within = min(begin + duration, t[-1] + step / 2) - max(begin, t[0] - step / 2)
         status = Status(int(found.status[row]))
         assert (Status.EDGE in status) == (within < duration * (1 - 1e-8))
-        if rows.size < (asked or 3) or (asked is None and 2 * within < duration):
+        assert (Status.GAP in status) == (asked is not None and bool(missing[rows].any()) and rows.size >= asked)
+        spoilt = asked is None and missing[rows].any()
+        rows = rows[~missing[rows]]
+        if spoilt or rows.size < (asked or p + 1) or (asked is None and 2 * within < duration):
             assert Status.INVALID in status
             assert np.isnan(found.params[row]).all()
             continue
@@ -253,7 +261,7 @@ def test_windows_of_a_duration_hold_the_rows_within(
         np.testing.assert_allclose(found.params[row], params, rtol=1e-8, atol=1e-9)
         np.testing.assert_allclose(found.stderr[row], error, rtol=1e-6)
         assert found.rss[row] == pytest.approx(rss, rel=1e-6, abs=1e-9)
-        assert found.residuals[row] == pytest.approx(b[row] - A[row] @ params, abs=1e-8)
+        assert found.residuals[row] == pytest.approx(b[row] - A[row] @ params, abs=1e-8, nan_ok=True)
 
 
 def test_a_duration_on_uniform_times_is_a_number_of_rows() -> None:

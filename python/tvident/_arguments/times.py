@@ -24,6 +24,9 @@ _LONGEST = 1e30
 # How far a time stamp may lie from a uniform grid, as a fraction of the sample period.
 _JITTER = 1e-3
 
+_FEW_TIMES = 100
+"""Times of which a step is asked first: they deny most steps."""
+
 _DIGITS = 9
 """Digits behind the point that printed times may have: nanoseconds."""
 
@@ -260,14 +263,22 @@ def printed_step(seconds: Seconds) -> float:
 
 def _quantum(seconds: Seconds, slack: float) -> float | None:
     """Return the decimal step that all times are multiples of, but for rounding; None where they have too many digits for one."""
+    largest = float(np.abs(seconds).max())
+    # Most times are none of most steps, as few of them show.
+    parts = (seconds[:_FEW_TIMES], seconds)
     for digits in range(_DIGITS + 1):
         allowed = slack * 10.0**digits
         if allowed > 0.1:  # noqa: PLR2004 - the numbers do not tell such steps
             return None
-        scaled = seconds * 10.0**digits
-        if float(np.abs(scaled - np.rint(scaled)).max()) <= allowed + float(np.spacing(np.abs(scaled).max())):
+        bound = allowed + float(np.spacing(largest * 10.0**digits))
+        if all(_off(part * 10.0**digits) <= bound for part in parts):
             return 10.0**-digits
     return None
+
+
+def _off(scaled: Seconds) -> float:
+    """Return how far numbers are from whole ones, at most."""
+    return float(np.abs(scaled - np.rint(scaled)).max())
 
 
 def _periods(seconds: Seconds, period: float, allowed: float) -> tuple[float, float] | None:

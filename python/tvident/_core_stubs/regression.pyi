@@ -25,6 +25,9 @@ class RollingRegressions:
     @property
     def status(self) -> npt.NDArray[np.uint16]: ...
 
+def rows_within(
+    times: npt.NDArray[np.float64], begins: npt.NDArray[np.float64], duration: float
+) -> tuple[npt.NDArray[np.uintp], npt.NDArray[np.uintp]]: ...
 def rolling_least_squares(
     regressors: npt.NDArray[np.number],
     rhs: npt.NDArray[np.number],
@@ -34,6 +37,7 @@ def rolling_least_squares(
     constant: int | None = None,
     correlated: bool = False,
     lags: int | None = None,
+    spans: tuple[npt.NDArray[np.uintp], npt.NDArray[np.uintp]] | None = None,
     step: int = 1,
     workers: int | None = None,
     progress: Callable[[int, int], object] | None = None,

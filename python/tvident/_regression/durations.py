@@ -1,15 +1,15 @@
-"""Windows of a duration on irregular times: each holds other rows, and those that hold as many are solved together."""
+"""Windows of a duration on irregular times: each holds other rows."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident import _core
 from tvident._regression.windows import AskedWindows
 from tvident._status import Status
 from tvident._units import times_in_seconds
@@ -19,23 +19,6 @@ Array = npt.NDArray[np.float64]
 _SAME = 1e-9
 """Rows that are less than this part of the duration beyond a window's border lie on it: rounding of times decides nothing."""
 
-_CHUNK = 1 << 14
-"""Rows whose windows are solved together, about: where the density of rows drifts they hold few different numbers of rows."""
-
-
-@dataclass
-class FoundInWindows:
-    """Results of all windows, as the core has them."""
-
-    params: Array
-    stderr: Array
-    residuals: Array
-    rss: Array
-    rsquared: Array
-    condition: Array
-    status: npt.NDArray[np.uint16]
-    lags: int = 0
-
 
 @dataclass(frozen=True)
 class Spans:
@@ -43,15 +26,21 @@ class Spans:
 
     Parameters
     ----------
-    first, count : ndarray, shape (n,)
+    first, end : ndarray, shape (n,)
+        The first row, and the one after the last.
     flags : ndarray of uint16, shape (n,)
         EDGE where a window reaches beyond the record, INVALID where less than half of it lies within.
     """
 
-    first: npt.NDArray[np.intp]
-    count: npt.NDArray[np.intp]
+    first: npt.NDArray[np.uintp]
+    end: npt.NDArray[np.uintp]
     flags: npt.NDArray[np.uint16]
     at_least: int | None
+
+    @property
+    def count(self) -> npt.NDArray[np.uintp]:
+        """How many rows each window holds."""
+        return self.end - self.first
 
 
 def irregular_times(asked: AskedWindows, rows: int) -> Array | None:
@@ -97,7 +86,7 @@ def spans_given(asked: AskedWindows, times: Array, regressors: int) -> Spans:
     slack = _SAME * duration
     # Full windows of uniform times hold as many rows wherever they are aligned: one border belongs to them.
     begins = times + {"centre": -duration / 2 - slack, "trailing": -duration + slack, "leading": -slack}[alignment]
-    first, end = np.searchsorted(times, begins), np.searchsorted(times, begins + duration)
+    first, end = _core.rows_within(times, begins, duration)
     half = float(np.median(np.diff(times))) / 2
     within = np.minimum(begins + duration, times[-1] + half + slack) - np.maximum(begins, times[0] - half - slack)
     flags = np.where(within < duration * (1 - _SAME) - slack, np.uint16(Status.EDGE), np.uint16(0))
@@ -112,7 +101,7 @@ def spans_given(asked: AskedWindows, times: Array, regressors: int) -> Spans:
             )
     else:
         flags = np.where(2 * within < duration * (1 - _SAME), flags | np.uint16(Status.INVALID), flags)
-    return Spans(first, end - first, flags.astype(np.uint16), at_least)
+    return Spans(first, end, flags.astype(np.uint16), at_least)
 
 
 def check_uniform(times: Array, *, is_correlated: bool, is_robust: bool) -> None:
@@ -130,46 +119,24 @@ def solved(
     regressors: npt.NDArray[np.number],
     columns: npt.NDArray[np.number],
     weights: Array | None,
-    solve: Callable[..., Any],
-) -> FoundInWindows:
+    solve: Callable[..., _core.RollingRegressions],
+) -> _core.RollingRegressions:
     """Solve every window; `solve` is the core's function with all that does not depend on windows."""
-    (rows, p), q = regressors.shape, columns.shape[1]
-    one, of_sides = np.full((p, q, rows), np.nan), np.full((q, rows), np.nan)
-    found = FoundInWindows(
-        params=one,
-        stderr=one.copy(),
-        residuals=of_sides,
-        rss=of_sides.copy(),
-        rsquared=of_sides.copy(),
-        condition=np.full(rows, np.nan),
-        status=spans.flags.copy(),
+    p, count = regressors.shape[1], spans.count
+    found = solve(
+        regressors.T,
+        columns.T,
+        {"rows": max(p + 1, int(count.max())), "alignment": "leading", "at_least": spans.at_least, "half_life": None},
+        weights=weights,
+        spans=(spans.first, spans.end),
     )
+    status = found.status
+    status |= spans.flags
     least = p + 1 if spans.at_least is None else spans.at_least
-    there = (spans.flags & Status.INVALID == 0) & (spans.count >= least)
+    out = np.flatnonzero((spans.flags & Status.INVALID != 0) | (count < least))
     few = Status.INVALID if spans.at_least is not None else Status.INVALID | Status.RANK_DEFICIENT
-    invalid = spans.flags & Status.INVALID != 0
-    found.status[~there] |= np.where(invalid, Status.INVALID, few)[~there].astype(np.uint16)
-    size = max(_CHUNK, 8 * int(spans.count.max()))
-    for begin in range(0, rows, size):
-        chunk = np.arange(begin, min(rows, begin + size))
-        chunk = chunk[there[chunk]]
-        for count in np.unique(spans.count[chunk]).tolist():
-            of = chunk[spans.count[chunk] == count]
-            low, high = int(spans.first[of[0]]), int(spans.first[of[-1]]) + count
-            part = solve(
-                regressors[low:high].T,
-                columns[low:high].T,
-                {"rows": count, "alignment": "leading", "at_least": spans.at_least, "half_life": None},
-                weights=None if weights is None else weights[low:high],
-            )
-            at = spans.first[of] - low
-            for name in ("params", "stderr", "rss", "rsquared", "condition"):
-                getattr(found, name)[..., of] = getattr(part, name)[..., at]
-            found.status[of] |= part.status[at]
-    used = np.ones(rows, bool) if weights is None else weights > 0
-    finite = np.isfinite(regressors).all(axis=1)
-    with np.errstate(all="ignore"):
-        predicted = np.einsum("np,pqn->qn", np.where(finite[:, None], regressors, np.nan), found.params)
-        found.residuals[:] = np.where(used, columns.T - predicted, np.nan)
-    found.residuals[~np.isfinite(found.residuals)] = np.nan
+    invalid = spans.flags[out] & Status.INVALID != 0
+    status[out] = spans.flags[out] | np.where(invalid, np.uint16(Status.INVALID), np.uint16(few))
+    for values in (found.params, found.stderr, found.residuals, found.rss, found.rsquared, found.condition):
+        values[..., out] = np.nan
     return found

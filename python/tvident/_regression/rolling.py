@@ -12,7 +12,7 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident import _core
 from tvident._huber import pseudo_values
-from tvident._regression.durations import FoundInWindows, check_uniform, irregular_times, solved, spans_given
+from tvident._regression.durations import check_uniform, irregular_times, solved, spans_given
 from tvident._regression.windows import (
     Alignment,
     AskedWindows,
@@ -142,7 +142,7 @@ def rolling_least_squares(
         Rows in a second, or seconds from row to row. One of these or ``t`` gives durations their meaning; numbers do not depend on it.
     t : array_like, shape (n,), optional
         Times of the rows, s, or dates. They give durations their meaning. Where they are not uniform, a window holds the rows within the
-        duration, as many as there are; the cost is then that of plain windows times how many different numbers of rows windows hold.
+        duration, as many as there are.
     loss : {"squares", "huber"}, optional
         ``"huber"``: residuals beyond 1.345 standard deviations (found from medians of blocks as long as windows) count linearly, so that
         spikes in ``b`` move parameters by little, however large they are. Spikes in ``A`` are no residuals: make them NaN.
@@ -255,10 +255,9 @@ def rolling_least_squares(
     # Every row's residual is needed.
     stride = 1 if is_correlated or times is not None else every
     solve = partial(_core.rolling_least_squares, constant=_constant(regressors, relative), workers=threads)
-    found: _core.RollingRegressions | FoundInWindows
     with arguments.reporter(progress, "least squares") as report:
         if times is not None:
-            found = solved(spans, regressors, columns, relative, solve)
+            found = solved(spans, regressors, columns, relative, partial(solve, progress=report))
         else:
             found = solve(
                 regressors.T,

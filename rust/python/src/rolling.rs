@@ -2,13 +2,13 @@
 
 use std::num::NonZeroUsize;
 
-use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArray};
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyUntypedArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tvident::exec::workers as threads;
 use tvident::lanes::Elements;
 use tvident::least_squares::HALF_OF_THE_DIGITS;
-use tvident::least_squares::{Alignment, Equations, Regressions, RollingLeastSquares};
+use tvident::least_squares::{Alignment, Equations, Regressions, RollingLeastSquares, Spans, not_before};
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
@@ -103,11 +103,32 @@ impl RollingRegressions {
     }
 }
 
+/// First rows and rows after the last.
+type RowSpans<'py> = (Bound<'py, PyArray1<usize>>, Bound<'py, PyArray1<usize>>);
+
+/// The rows whose times lie in each of some spans of a duration: the first, and the one after the last. Neither times nor begins of spans may
+/// decrease.
+#[pyfunction]
+pub(crate) fn rows_within<'py>(
+    py: Python<'py>,
+    times: PyReadonlyArray1<'py, f64>,
+    begins: PyReadonlyArray1<'py, f64>,
+    duration: f64,
+) -> PyResult<RowSpans<'py>> {
+    let (times, begins) = (times.as_slice()?.to_vec(), begins.as_slice()?.to_vec());
+    let first = not_before(&times, begins.iter().copied());
+    let end = not_before(&times, begins.iter().map(|begin| begin + duration));
+    Ok((PyArray1::from_vec(py, first), PyArray1::from_vec(py, end)))
+}
+
 /// Least squares in every window of rows; regressors, right-hand sides and weights have the rows along their last axis. `constant` is the
 /// regressor that is a constant. With `correlated`, which needs a step of 1, standard errors know of residuals that are correlated over so
-/// many `lags`, or over as many as they ask for.
+/// many `lags`, or over as many as they ask for. `spans` are the first row of each window and the one after its last, where windows hold different
+/// numbers of rows; they need a step of 1 too.
 #[pyfunction]
-#[pyo3(signature = (regressors, rhs, windows, *, weights=None, constant=None, correlated=false, lags=None, step=1, workers=None, progress=None))]
+#[pyo3(signature = (
+    regressors, rhs, windows, *, weights=None, constant=None, correlated=false, lags=None, spans=None, step=1, workers=None, progress=None
+))]
 #[allow(clippy::too_many_arguments, reason = "named by Python")]
 pub(crate) fn rolling_least_squares<'py>(
     regressors: &Bound<'py, PyUntypedArray>,
@@ -117,6 +138,7 @@ pub(crate) fn rolling_least_squares<'py>(
     constant: Option<usize>,
     correlated: bool,
     lags: Option<usize>,
+    spans: Option<(PyReadonlyArray1<'py, usize>, PyReadonlyArray1<'py, usize>)>,
     step: usize,
     workers: Option<NonZeroUsize>,
     progress: Option<&Bound<'py, PyAny>>,
@@ -134,6 +156,13 @@ pub(crate) fn rolling_least_squares<'py>(
     let weights = weights.as_ref().and_then(|records| records.first()).map(|record| record as &dyn Samples);
     let equations = Equations { columns, weights, rows: 0..total };
     let (elements, workers) = (Elements { first: 0, step }, threads(workers));
+    // Copies, since others may write to the arrays.
+    let spans =
+        spans.map(|(first, end)| PyResult::Ok((first.as_slice()?.to_vec(), end.as_slice()?.to_vec()))).transpose()?;
+    let spans = spans.as_ref().map(|(first, end)| Spans { first, end });
+    if spans.is_some_and(|spans| !spans.are_of(total)) {
+        return Err(PyValueError::new_err("windows must be in order, within the record, and one for every row"));
+    }
     RollingRegressions::filled(py, (p, q), (elements, total.div_ceil(step)), true, |mut regressions| {
         for rhs_index in 0..q {
             regressions.parameters.swap(rhs_index, constant * q + rhs_index);
@@ -141,7 +170,9 @@ pub(crate) fn rolling_least_squares<'py>(
         }
         let mut over = 0;
         watched(py, progress, |watch| {
-            if correlated {
+            if let Some(spans) = spans {
+                plan.run_spans(&equations, spans, regressions, workers, watch)
+            } else if correlated {
                 over = plan.run_correlated(&equations, regressions, lags, workers, watch)?;
                 Ok(())
             } else {

@@ -199,6 +199,19 @@ pub(crate) fn write_row(
     }
 }
 
+/// Writes the windows that the tile holds, those of all lanes one after the other from its first place on, to neighbouring elements.
+pub(crate) fn write_block(tile: &Tile, lanes: usize, elements: Range<usize>, outputs: &mut Outputs<'_>) {
+    for (field, values) in outputs.values.iter_mut().enumerate().filter(|(_, values)| !values.is_empty()) {
+        values[elements.clone()].copy_from_slice(&tile.all(field, lanes)[..elements.len()]);
+    }
+    if !outputs.status.is_empty() {
+        let codes = tile.all(outputs.values.len(), lanes);
+        for (status, &code) in outputs.status[elements].iter_mut().zip(codes) {
+            *status = parts(code).1;
+        }
+    }
+}
+
 /// The order and the flags of a code.
 fn parts(code: f64) -> (u8, u16) {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number below 2^24")]

@@ -68,6 +68,11 @@ impl Tile {
         self.values[self.at(field, window) * lanes + lane]
     }
 
+    /// One field of all windows of every lane, one after the other.
+    pub(crate) fn all(&self, field: usize, lanes: usize) -> &[f64] {
+        &self.values[field * self.places * lanes..][..self.places * lanes]
+    }
+
     #[inline(always)]
     fn at(&self, field: usize, window: usize) -> usize {
         field * self.places + (window & (self.places - 1))

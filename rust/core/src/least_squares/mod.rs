@@ -14,8 +14,10 @@ pub(crate) mod row_products;
 pub(crate) mod side_by_side;
 pub(crate) mod sliding_sums;
 pub(crate) mod solutions;
+pub(crate) mod spans;
 pub(crate) mod stacked_qr;
 pub(crate) mod window_summary;
 
 pub use plan::{Alignment, Equations, HALF_OF_THE_DIGITS, Regressions, RollingLeastSquares};
+pub use spans::{Spans, not_before};
 pub use stacked_qr::{SharedParameters, Summary};
