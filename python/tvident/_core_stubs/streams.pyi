@@ -67,6 +67,7 @@ class RollingStream:
         rhs_count: int,
         *,
         weighted: bool = False,
+        lags: int | None = None,
         step: int = 1,
         state: _StreamState | None = None,
     ) -> RollingStream: ...

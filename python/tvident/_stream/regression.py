@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,7 @@ from tvident._regression import (
     Alignment,
     RegressionWindows,
     half_life_given,
+    lags_given,
     least_given,
     unit_of_weights,
 )
@@ -68,6 +69,12 @@ class RollingStream(Stream[StreamedRegression]):
     min_observations : int, optional
         Rows without a missing value that a window must hold, more than there are regressors: missing rows are left out, and the status of
         their windows says GAP. By default a missing row makes its windows NaN, and near the ends half of the rows suffice.
+    covariance : {"classic", "hac"}, optional
+        ``"hac"``: standard errors know of residuals that are correlated from row to row, as in :func:`rolling_least_squares`. They need the
+        residuals of neighbouring windows: results come two windows later.
+    lags : int, optional
+        With ``covariance="hac"``, which needs it in a stream: residuals farther apart than so many rows are independent. What an earlier
+        recording asked for is in ``reg.lags``.
     step : int, optional
         Every how many rows a result is wanted.
 
@@ -75,15 +82,15 @@ class RollingStream(Stream[StreamedRegression]):
     ----------
     delay : int
         Rows from one to its window: the rows of a window after the one it belongs to. None of trailing windows, half a window of centred
-        ones, all but one of leading ones.
+        ones, all but one of leading ones; with ``covariance="hac"`` two windows more.
     rows : int
         Rows that have come so far.
 
     Raises
     ------
     ValueError
-        If a length is not positive, an alignment has another name, ``min_observations`` is more than a window has, or ``half_life`` goes
-        with centred windows.
+        If a length is not positive, an alignment has another name, ``min_observations`` is more than a window has, ``half_life`` goes
+        with centred windows or "hac", or that has no ``lags``, or as many as half of a window.
     TypeError
         If a number is not whole.
 
@@ -96,7 +103,8 @@ class RollingStream(Stream[StreamedRegression]):
     -----
     A row that comes alone costs one merge of two factors and one solution, whatever the window; the first row after every
     `window_length` rows costs that many appends more. Many rows at a time are solved side by side, as in a batch. A stream pickles with
-    the rows of at most two windows, and goes on where it was.
+    the rows of at most two windows, and goes on where it was. With ``covariance="hac"`` windows are solved once every `window_length`
+    rows, together with their neighbours: all of it costs some six times as much, and a stream keeps the rows of some seven windows.
 
     References
     ----------
@@ -139,6 +147,8 @@ class RollingStream(Stream[StreamedRegression]):
         alignment: Alignment = "centre",
         half_life: float | None = None,
         min_observations: int | None = None,
+        covariance: Literal["classic", "hac"] = "classic",
+        lags: int | None = None,
         step: int = 1,
     ) -> None:
         length = arguments.whole_number("window_length", window_length, least=1)
@@ -147,6 +157,13 @@ class RollingStream(Stream[StreamedRegression]):
         least = least_given(min_observations, length, 0)
         rows = None if half_life is None else arguments.positive_number("half_life", half_life)
         self._windows = RegressionWindows(length, where, least, half_life_given(rows, 1.0, where, length, 0))
+        is_correlated = arguments.one_of("covariance", covariance, ("classic", "hac")) == "hac"
+        self._lags = lags_given(lags, self._windows, is_correlated=is_correlated, is_robust=False)
+        if is_correlated and self._lags is None:
+            raise ValueError(
+                "lags must be given where covariance='hac' in a stream; got none, which needs the whole record; give those of an earlier "
+                "recording: rolling_least_squares(…, covariance='hac').lags"
+            )
         self._step = arguments.whole_number("step", step, least=1)
         self._shape: tuple[int, int] | None = None
         self._one_rhs = True
@@ -162,7 +179,7 @@ class RollingStream(Stream[StreamedRegression]):
         --------
         push : gives windows that late.
         """
-        return self._windows.after
+        return self._windows.after + (0 if self._lags is None else 2 * self._windows.rows)
 
     @property
     def rows(self) -> int:
@@ -269,7 +286,12 @@ class RollingStream(Stream[StreamedRegression]):
             None
             if self._shape is None
             else _core.RollingStream(
-                self._windows.told(), *self._shape, weighted=self._weighted, step=self._step, state=state
+                self._windows.told(),
+                *self._shape,
+                weighted=self._weighted,
+                lags=self._lags,
+                step=self._step,
+                state=state,
             )
         )
 

@@ -10,7 +10,9 @@ use tvident::lanes::Elements;
 use tvident::least_squares::Regressions;
 use tvident::local_polynomials::{Estimates, LocalPolynomials as Plan};
 use tvident::record::Samples;
-use tvident::stream::{PolynomialState, PolynomialStream as Polynomials, RollingState, RollingStream as Rolling};
+use tvident::stream::{
+    CorrelatedStream, PolynomialState, PolynomialStream as Polynomials, RollingState, RollingStream as Rolling,
+};
 
 use crate::arrays::{rows, zeros};
 use crate::local_polynomials::{LocalEstimates, LocalPolynomials};
@@ -188,6 +190,22 @@ pub(crate) fn one(samples: &Bound<'_, PyUntypedArray>) -> PyResult<StridedSample
     }
 }
 
+/// Standard errors know of correlated residuals, or not.
+enum Windows {
+    Correlated(Box<CorrelatedStream>),
+    Independent(Box<Rolling>),
+}
+
+/// Calls the same method of either.
+macro_rules! either {
+    ($stream:expr, $one:ident => $call:expr) => {
+        match $stream {
+            Windows::Correlated($one) => $call,
+            Windows::Independent($one) => $call,
+        }
+    };
+}
+
 /// Least squares in windows of rows that come piece by piece.
 #[pyclass(module = "tvident._core")]
 pub(crate) struct RollingStream {
@@ -195,18 +213,19 @@ pub(crate) struct RollingStream {
     rhs_count: usize,
     weighted: bool,
     step: usize,
-    stream: Rolling,
+    stream: Windows,
 }
 
 #[pymethods]
 impl RollingStream {
     #[new]
-    #[pyo3(signature = (windows, regressors, rhs_count, *, weighted=false, step=1, state=None))]
+    #[pyo3(signature = (windows, regressors, rhs_count, *, weighted=false, lags=None, step=1, state=None))]
     fn new(
         windows: RowWindows,
         regressors: usize,
         rhs_count: usize,
         weighted: bool,
+        lags: Option<usize>,
         step: usize,
         state: Option<Stored<'_>>,
     ) -> PyResult<Self> {
@@ -215,7 +234,14 @@ impl RollingStream {
             None => RollingState::default(),
             Some((first, rows, given, ended)) => RollingState { first, rows: rows.as_slice()?.to_vec(), given, ended },
         };
-        let stream = if weighted { Rolling::weighted(plan, step, state) } else { Rolling::resume(plan, step, state) };
+        let stream = match lags {
+            Some(lags) => CorrelatedStream::resume(plan, lags, weighted, state)
+                .map(|stream| Windows::Correlated(Box::new(stream))),
+            None if weighted => {
+                Rolling::weighted(plan, step, state).map(|stream| Windows::Independent(Box::new(stream)))
+            }
+            None => Rolling::resume(plan, step, state).map(|stream| Windows::Independent(Box::new(stream))),
+        };
         let stream = stream.map_err(|error| exception(&error))?;
         Ok(Self { regressors, rhs_count, weighted, step, stream })
     }
@@ -223,18 +249,18 @@ impl RollingStream {
     /// Rows from one to its window.
     #[getter]
     fn delay(&self) -> usize {
-        self.stream.delay()
+        either!(&self.stream, stream => stream.delay())
     }
 
     /// Rows taken in so far.
     #[getter]
     fn rows(&self) -> usize {
-        self.stream.rows()
+        either!(&self.stream, stream => stream.rows())
     }
 
     /// What resuming needs.
     fn state<'py>(&self, py: Python<'py>) -> State<'py> {
-        let state = self.stream.state();
+        let state = either!(&self.stream, stream => stream.state());
         (state.first, PyArray1::from_vec(py, state.rows), state.given, state.ended)
     }
 
@@ -263,24 +289,24 @@ impl RollingStream {
         let weights = weights.map(one).transpose()?;
         let columns: Vec<StridedSamples> = regressors.into_iter().chain(rhs).chain(weights).collect();
         let count = columns.first().map_or(0, Samples::len);
-        let given = self.stream.upcoming(count);
+        let given = either!(&self.stream, stream => stream.upcoming(count));
         let stream = &mut self.stream;
         windows(py, (self.regressors, self.rhs_count), given, self.step, |regressions| {
             in_pieces(py, count, |samples| {
                 let parts: Vec<Part<'_>> =
                     columns.iter().map(|record| Part { record, samples: samples.clone() }).collect();
                 let parts: Vec<&dyn Samples> = parts.iter().map(|part| part as &dyn Samples).collect();
-                stream.push(&parts, regressions);
+                either!(&mut *stream, stream => stream.push(&parts, regressions));
             })
         })
     }
 
     /// Ends the stream and returns the rest, as `push` does.
     fn finish(&mut self, py: Python<'_>) -> PyResult<StreamedRegressions> {
-        let given = self.stream.at_end();
+        let given = either!(&self.stream, stream => stream.at_end());
         let stream = &mut self.stream;
         windows(py, (self.regressors, self.rhs_count), given, self.step, |regressions| {
-            stream.finish(regressions);
+            either!(stream, stream => stream.finish(regressions));
             Ok(())
         })
     }

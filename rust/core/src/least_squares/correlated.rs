@@ -17,12 +17,13 @@ use crate::least_squares::error_scale::ErrorScale;
 use crate::least_squares::givens_factor::{MOST_PAIRS, MOST_REGRESSORS};
 use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares};
 use crate::least_squares::rounds::{Lender, Lent, Rounds, SomeWindows};
-use crate::least_squares::row_products::{RowProducts, multiply, pairs, side_by_side};
+use crate::least_squares::row_fits::{Fits, ProductsOfRows};
+use crate::least_squares::row_products::{RowProducts, pairs, side_by_side};
+use crate::least_squares::side_by_side::RollingScratch;
 use crate::least_squares::sliding_sums::{begin, slide, sliding_sums};
 use crate::record::subsample::stretches;
 use crate::simd::aligned::Aligned;
-use crate::simd::vectors::{Kernel, Lanes, MOST_LANES, apart, dispatch};
-use crate::status::Status;
+use crate::simd::vectors::{Kernel, Lanes, apart, dispatch};
 
 /// Rows of which the correlation of the residuals is learnt: it is known to a few thousandths then.
 const LEARNT_OF: usize = 1 << 17;
@@ -54,7 +55,7 @@ impl RollingLeastSquares {
         for round in all {
             rounds.solve(&self.needed_by(&rounds.rows_of(&round)), &mut stages)?;
             for (rhs, bandwidth) in bandwidths.iter().enumerate() {
-                let (fits, errors) = Fits::of(&self, equations, rhs, &mut rounds.regressions);
+                let (fits, errors) = Fits::of(&self, equations, (rhs, total), &mut rounds.regressions);
                 fits.run(bandwidth, &rounds.pieces[round.clone()], errors, &scratch, &mut stages)?;
             }
             rounds.forget(round);
@@ -75,8 +76,38 @@ impl RollingLeastSquares {
         for rows in &some {
             rounds.solve(&self.needed_by(rows), stages)?;
         }
-        let of_rhs = |rhs| Fits::of(self, equations, rhs, &mut rounds.regressions).0.bandwidth(&some, stages);
+        let of_rhs = |rhs| Fits::of(self, equations, (rhs, total), &mut rounds.regressions).0.bandwidth(&some, stages);
         (0..self.rhs_count).map(of_rhs).collect()
+    }
+
+    /// Solves the windows around some rows, which are `wanted`, and others `around` them that their errors need, as
+    /// [`RollingLeastSquares::run_correlated`] does with a given bandwidth. Of the equations those in the windows must be there. The plan
+    /// wants the normal matrices, and the outputs belong to every row from the first of those around on.
+    pub(crate) fn solve_correlated(
+        &self,
+        equations: &Equations<'_>,
+        (wanted, around): (Range<usize>, Range<usize>),
+        bandwidth: &Bandwidth,
+        regressions: &mut Regressions<'_>,
+        scratch: &mut CorrelatedScratch,
+    ) {
+        let CorrelatedScratch { windows, sums, normal } = scratch;
+        for column in normal.iter_mut() {
+            column.resize(around.len(), 0.0);
+        }
+        {
+            let mut outputs = regressions.reborrow();
+            outputs.normal = normal.iter_mut().map(Vec::as_mut_slice).collect();
+            self.solve(equations, around.clone(), &mut outputs, windows);
+        }
+        let own = wanted.start - around.start..wanted.end - around.start;
+        for rhs in 0..self.rhs_count {
+            let (fits, errors) = Fits::of(self, equations, (rhs, equations.rows.end), regressions);
+            let errors = errors.into_iter().map(|errors| &mut errors[own.clone()]).collect();
+            let normal = normal.iter().map(|column| &column[own.clone()]).collect();
+            let rows = wanted.clone();
+            dispatch(self.instructions, Sandwich { fits: &fits, bandwidth, rows, normal, errors, scratch: sums });
+        }
     }
 
     /// The windows around these rows are needed for the errors of windows around some rows, beside those before.
@@ -85,17 +116,23 @@ impl RollingLeastSquares {
     }
 }
 
-/// What the windows of a record found for one right-hand side.
-struct Fits<'a> {
-    plan: &'a RollingLeastSquares,
-    equations: &'a Equations<'a>,
-    rhs: usize,
-    parameters: Vec<&'a [f64]>,
-    status: &'a [u16],
+/// Memory for windows of rows that go on coming.
+#[derive(Debug)]
+pub(crate) struct CorrelatedScratch {
+    windows: RollingScratch,
+    sums: Scratch,
+    normal: Vec<Vec<f64>>,
+}
+
+impl CorrelatedScratch {
+    pub(crate) fn new(plan: &RollingLeastSquares) -> Self {
+        let pairs = plan.regressors * (plan.regressors - 1) / 2;
+        Self { windows: plan.scratch(), sums: Scratch::default(), normal: vec![Vec::new(); pairs] }
+    }
 }
 
 /// Memory of one thread.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Scratch {
     products: RowProducts,
     /// Sums of neighbouring rows, then of the products of each pair of these: the sums of one block, and the suffixes of the next.
@@ -104,125 +141,7 @@ struct Scratch {
     next: Aligned,
 }
 
-impl<'a> Fits<'a> {
-    /// These of one right-hand side, and where their errors are to be: now the diagonals of the inverses of normal matrices are there.
-    fn of(
-        plan: &'a RollingLeastSquares,
-        equations: &'a Equations<'a>,
-        rhs: usize,
-        regressions: &'a mut Regressions<'_>,
-    ) -> (Self, Vec<&'a mut [f64]>) {
-        let Regressions { parameters, errors, status, .. } = regressions;
-        let parameters = parameters.iter().skip(rhs).step_by(plan.rhs_count).map(|values| &**values).collect();
-        let errors = errors.iter_mut().skip(rhs).step_by(plan.rhs_count).map(|values| &mut **values).collect();
-        (Self { plan, equations, rhs, parameters, status }, errors)
-    }
-}
-
 impl Fits<'_> {
-    fn rows(&self) -> usize {
-        self.status.len()
-    }
-
-    /// The result whose window would lie best around a row, if it is valid: at the ends the first and the last full windows do.
-    fn centre(&self, row: usize) -> usize {
-        let (plan, total) = (self.plan, self.rows());
-        (row.saturating_sub(plan.window / 2).min(total.saturating_sub(plan.window)) + plan.before).min(total - 1)
-    }
-
-    fn is_valid(&self, row: usize) -> bool {
-        self.status[row] & Status::INVALID.bits() == 0
-    }
-
-    /// The results around some rows where these are one after the other.
-    fn own_fits(&self, rows: &Range<usize>) -> Option<Range<usize>> {
-        let fits = self.centre(rows.start)..self.centre(rows.end - 1) + 1;
-        let is_inside = rows.start >= self.plan.window / 2 && fits.len() == rows.len();
-        // No early return, so that the loop becomes vector instructions.
-        let any = || self.status[fits.clone()].iter().fold(0, |any, flags| any | flags);
-        (is_inside && any() & Status::INVALID.bits() == 0).then_some(fits)
-    }
-
-    /// The result whose window lies best around each of some rows, or the number of rows where there is none.
-    fn nearest(&self, rows: Range<usize>) -> Vec<usize> {
-        let (plan, total) = (self.plan, self.rows());
-        let (is_valid, centre) = (|row: usize| self.is_valid(row), |row: usize| self.centre(row));
-        let begin = centre(rows.start).saturating_sub(plan.window);
-        let end = total.min(centre(rows.end - 1) + plan.window);
-        if (begin..end).all(is_valid) {
-            return rows.map(centre).collect();
-        }
-        let mut before = Vec::with_capacity(end - begin);
-        for row in begin..end {
-            before.push(if is_valid(row) { row } else { before.last().copied().unwrap_or(total) });
-        }
-        let mut after = vec![total; end - begin + 1];
-        for row in (begin..end).rev() {
-            after[row - begin] = if is_valid(row) { row } else { after[row - begin + 1] };
-        }
-        let nearest = |row: usize| {
-            let centre = centre(row);
-            let (before, after) = (before[centre - begin], after[centre - begin]);
-            if before < total && (after == total || centre - before <= after - centre) { before } else { after }
-        };
-        rows.map(nearest).collect()
-    }
-
-    /// The products of some rows; those outside of the record, and those that are not before an end, are zero.
-    #[inline(always)]
-    fn products<S: Lanes, const N: usize, const R: usize>(
-        &self,
-        simd: S,
-        range: Range<isize>,
-        end: usize,
-        products: &mut RowProducts,
-    ) {
-        let p = if R == 0 { self.plan.regressors } else { R };
-        let clamp = |row: isize| row.clamp(0, end.min(self.rows()).cast_signed()).unsigned_abs();
-        let rows = clamp(range.start)..clamp(range.end);
-        let (length, count) = ((range.end - range.start).max(0).unsigned_abs(), rows.len());
-        let RowProducts { first, values, counts, columns } = products;
-        *first = range.start;
-        let values = side_by_side::<N>(values, length + MOST_LANES);
-        counts.resize(length + 1, 0);
-        if rows.is_empty() {
-            values.fill([0.0; N]);
-            counts.fill(0);
-            return;
-        }
-        let skipped = (rows.start.cast_signed() - range.start).unsigned_abs();
-        values[..skipped].fill([0.0; N]);
-        counts[..=skipped].fill(0);
-        let given = p + 1 + usize::from(self.equations.weights.is_some());
-        let own_fits = self.own_fits(&rows);
-        let wanted = (given + if own_fits.is_some() { 0 } else { p }) * count;
-        if columns.len() < wanted {
-            columns.resize(wanted, 0.0);
-        }
-        let (columns, rest) = columns[..wanted].split_at_mut(given * count);
-        let sources = self.equations.columns[..p].iter().chain([&self.equations.columns[p + self.rhs]]);
-        for (source, into) in sources.chain(&self.equations.weights).zip(columns.chunks_mut(count)) {
-            source.read(rows.start, into);
-        }
-        let mut parameters: [&[f64]; MOST_REGRESSORS] = Default::default();
-        if let Some(fits) = own_fits {
-            parameters.iter_mut().zip(&self.parameters).for_each(|(into, all)| *into = &all[fits.clone()]);
-        } else {
-            let fits = self.nearest(rows);
-            for ((into, all), place) in parameters.iter_mut().zip(&self.parameters).zip(rest.chunks_mut(count)) {
-                for (parameter, &fit) in place.iter_mut().zip(&fits) {
-                    *parameter = all.get(fit).copied().unwrap_or(f64::NAN);
-                }
-                *into = place;
-            }
-        }
-        let places = skipped..skipped + count;
-        let counted = &mut counts[places.start + 1..=places.end];
-        let all = multiply(simd, columns, &parameters[..p], &mut values[places.start..], counted);
-        values[places.end..].fill([0.0; N]);
-        counts[places.end + 1..].fill(all);
-    }
-
     /// Over how many rows residuals are correlated, as some rows show.
     fn bandwidth(&self, some: &[Range<usize>], stages: &mut Stages<'_, '_>) -> Result<Bandwidth, Error> {
         let pieces = some.iter().map(|rows| Piece { size: rows.len(), content: rows.clone() }).collect();
@@ -266,23 +185,6 @@ impl Fits<'_> {
         };
         stages.map(pieces, || scratch.lend(Scratch::default), work)?;
         Ok(())
-    }
-}
-
-/// The kernel that makes the products of some rows, of `R` regressors, or of up to `N` where that is zero.
-struct ProductsOfRows<'a, 'b, 'c, const N: usize, const R: usize> {
-    fits: &'a Fits<'b>,
-    range: Range<isize>,
-    end: usize,
-    into: &'c mut RowProducts,
-}
-
-impl<const N: usize, const R: usize> Kernel for ProductsOfRows<'_, '_, '_, N, R> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Lanes>(self, simd: S) {
-        self.fits.products::<S, N, R>(simd, self.range, self.end, self.into);
     }
 }
 

@@ -10,6 +10,7 @@ pub(crate) mod one_by_one;
 pub(crate) mod plan;
 pub(crate) mod rolling;
 pub(crate) mod rounds;
+pub(crate) mod row_fits;
 pub(crate) mod row_products;
 pub(crate) mod side_by_side;
 pub(crate) mod sliding_sums;

@@ -7,7 +7,7 @@ use crate::simd::aligned::Aligned;
 use crate::simd::vectors::{Lanes, MOST_LANES};
 
 /// Regressors times residuals of some rows, side by side, zero where there are none.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(crate) struct RowProducts {
     pub(crate) first: isize,
     /// Whole vectors of numbers a row, of which the first are those of its regressors.
