@@ -154,30 +154,19 @@ def test_errors_of_a_trend_hold_up_to_its_ends(kind: str, colour: str) -> None:
     assert (np.mean(covered, axis=0) > COVERAGE[0] - 0.06).all(), covered
 
 
-@pytest.mark.parametrize("colour", ["0", "0.3", "0.5", *long("0.8", "0.9")])
+@pytest.mark.parametrize("colour", ["0", "0.5", *long("0.3", "0.8", "0.9")])
 @pytest.mark.parametrize(("kind", "degree"), [("constant", 0), ("line", 1)])
-@pytest.mark.parametrize(
-    "samples",
-    [
-        2000,
-        *(
-            pytest.param(
-                samples,
-                marks=[
-                    pytest.mark.long,
-                    pytest.mark.xfail(strict=False, reason="one of six seems to bend by chance, and has short windows"),
-                ],
-            )
-            for samples in (20_000, 70_001)
-        ),
-    ],
-)
+@pytest.mark.parametrize("samples", [2000, 70_001, *long(20_000, 200_001)])
 def test_a_trend_has_windows_as_long_as_itself(kind: str, degree: int, colour: str, samples: int) -> None:
-    """They were half of it at most: second derivatives were seven times worse than a polynomial over all of it."""
+    """They were half of it at most: second derivatives were seven times worse than a polynomial over all of it.
+
+    Of long records windows had to be the longest for each derivative by itself: second derivatives of one of eight were
+    300 to 1300 times worse.
+    """
     truth = motion(kind, samples)
     x = np.linspace(-1, 1, samples)
     ratios, covered = [], []
-    for seed in range(30, 42 if samples < 10_000 else 36):
+    for seed in range(30, 42):
         y = truth[0] + 0.03 * noise(colour, seed, samples)
         fit = tvident.fit_local_polynomials(y, "auto", sample_rate=RATE)
         for d in range(3):
@@ -186,7 +175,6 @@ def test_a_trend_has_windows_as_long_as_itself(kind: str, degree: int, colour: s
             error = fit.derivatives[d] - truth[d]
             ratios.append(rms(error) / rms(np.asarray(best - truth[d])))
             covered.append(np.mean(np.abs(error) < 1.96 * fit.stderr[d]))
-    # By chance some records seem to bend, and have windows of their own.
     assert np.exp(np.mean(np.log(np.reshape(ratios, (-1, 3))), axis=0)).max() <= AT_MOST, np.reshape(ratios, (-1, 3))
     assert np.mean(np.reshape(covered, (-1, 3)), axis=0).min() > COVERAGE[0] - 0.03, covered
 

@@ -7,13 +7,12 @@
 
 use std::num::NonZeroUsize;
 
-use crate::auto_derivatives::block_means::WHOLE;
 use crate::auto_derivatives::boundary;
 use crate::auto_derivatives::candidate_weights::Refinement;
 use crate::auto_derivatives::candidates::Target;
 use crate::auto_derivatives::global_choice::{Pair, SHORTEST, rounded};
 use crate::auto_derivatives::local_weights::DerivativeOutputs;
-use crate::auto_derivatives::survey::{CLOSELY, LONGEST, Survey};
+use crate::auto_derivatives::survey::{CLOSELY, Survey};
 use crate::auto_derivatives::trend::ParabolicTrend;
 use crate::auto_derivatives::whole_record::WholeTarget;
 use crate::error::Error;
@@ -164,19 +163,13 @@ pub fn estimate_automatically(
     let (shortest, instructions, of_means) = (*shortest, *instructions, samples > CLOSELY);
     let target = Target { derivative, highest, fixed, shortest, of_means, delta, noise, instructions };
     let total = 2 * samples;
-    let trend = trend.as_ref().filter(|trend| highest >= trend.degree);
-    // Of longer records there are many windows of any length: they must have found none too long, either.
-    let best = match trend {
-        Some(_) if samples <= WHOLE => None,
-        _ => survey.best(&target, &mut || check_cancelled(watch, 0, total))?,
-    };
-    let none_too_long = samples <= WHOLE || best.is_some_and(|pair| pair.half >= LONGEST / 2);
-    if let Some(trend) = trend.filter(|_| none_too_long) {
+    if let Some(trend) = trend.as_ref().filter(|trend| highest >= trend.degree) {
         check_cancelled(watch, samples, total)?;
         let choice = of_trend(trend, &target, estimates);
         check_cancelled(watch, total, total)?;
         return Ok(Some(choice));
     }
+    let best = survey.best(&target, &mut || check_cancelled(watch, 0, total))?;
     let planned = best.map(|pair| Ok((pair, Refinement::new(samples, pair, &target)?))).transpose()?;
     let Some((pair, Some(refinement))) = planned else {
         estimates.values.fill(f64::NAN);

@@ -4,7 +4,7 @@
 //! derivative's own on, each is weighed by how far its coefficients exceed their noise, and their estimates are averaged:
 //!
 //! ```text
-//! w_k ∝ exp(½ Σ_{j≤k} (c_j²/var c_j - λ)),   λ = 8.
+//! w_k ∝ exp(½ Σ_{j≤k} (c_j²/var c_j - λ)),   λ = 10.
 //! ```
 //!
 //! `λ` is what a degree must gain to count. A record that bends a little less than that still bends, and the next degree would have moved
@@ -38,7 +38,7 @@ const LEAST_MEANS: usize = 1 << 10;
 const HIGHEST: usize = 6;
 
 /// What a degree must gain to count in estimates, and in their errors.
-const CHARGE: f64 = 8.0;
+const CHARGE: f64 = 10.0;
 const CHARGE_OF_ERRORS: f64 = 2.0;
 
 /// Places in half a record at which errors are computed; between them they are interpolated.
@@ -110,19 +110,16 @@ impl WholeRecord {
             if noise.is_white() {
                 return std::array::from_fn(|other| if other == degree { variance * share } else { 0.0 });
             }
-            let row = (0..length).map(|mean| self.basis.value(degree, mean) * share);
-            let at_samples: Vec<f64> = row.flat_map(|value| std::iter::repeat_n(value, self.step)).collect();
-            let at_samples = noise.correlate(&at_samples);
-            let of_mean = |part: &[f64]| share * part.iter().sum::<f64>();
+            let own: Vec<f64> = (0..length).map(|mean| self.basis.value(degree, mean)).collect();
             let mut sums = [0.0; DEGREES];
-            for (index, value) in at_samples.chunks_exact(self.step).map(of_mean).enumerate() {
+            for (index, value) in noise.covariances_of_means(&own, self.step).into_iter().enumerate() {
                 let (row, mirrored) = self.basis.row(index);
                 for (other, (sum, q)) in sums.iter_mut().zip(row).enumerate() {
                     *sum += if mirrored && other % 2 == 1 { -value * q } else { value * q };
                 }
             }
             // Even and odd degrees are uncorrelated; sums of what cancels would leave rounding.
-            let kept = |(other, sum): (usize, f64)| if (other + degree) % 2 == 0 { variance * sum } else { 0.0 };
+            let kept = |(other, sum): (usize, f64)| if (other + degree) % 2 == 0 { sum } else { 0.0 };
             let mut sums = sums.into_iter().enumerate().map(kept);
             std::array::from_fn(|_| sums.next().unwrap_or(0.0))
         };

@@ -5,6 +5,9 @@
 //! density `1/f` (a sum of relaxations, as Bernamont found it in resistors in 1937). A sequence is multiplied by such a covariance
 //! matrix in two recursions. All of them may have gone through one filter, whose autocovariances are few: those of the noise are convolved with them.
 
+/// What is left of a correlation over a mean of samples, if means next to each other share nothing.
+const FORGOTTEN: f64 = 1e-9;
+
 /// White noise and first-order noises, as they are or behind a filter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CorrelatedNoise {
@@ -74,7 +77,7 @@ impl CorrelatedNoise {
 
     /// Samples over which the slowest of the noises falls to a part of `1/e`.
     pub(crate) fn memory(&self) -> f64 {
-        self.first_order.iter().map(|(correlation, _)| -1.0 / correlation.ln()).fold(0.0, f64::max)
+        self.first_order.iter().map(|(correlation, _)| -1.0 / correlation.abs().ln()).fold(0.0, f64::max)
     }
 
     /// The density at an angular frequency per sample: that of white noise is its variance.
@@ -109,6 +112,41 @@ impl CorrelatedNoise {
             }
         }
         product
+    }
+
+    /// The product of the matrix of covariances of the means of so many neighbouring samples, side by side, and a sequence.
+    pub(crate) fn covariances_of_means(&self, sequence: &[f64], step: usize) -> Vec<f64> {
+        if !self.filter.is_empty() && step > 1 {
+            let share = 1.0 / step as f64;
+            let at_samples = sequence.iter().flat_map(|value| std::iter::repeat_n(share * value, step));
+            let product = self.correlate(&at_samples.collect::<Vec<f64>>());
+            return product.chunks_exact(step).map(|part| share * self.variance() * part.iter().sum::<f64>()).collect();
+        }
+        let of_means = if step > 1 { &self.of_means(step) } else { self };
+        let variance = of_means.variance();
+        of_means.correlate(sequence).into_iter().map(|product| variance * product).collect()
+    }
+
+    /// The noise of such means, without a filter: `ρ^r` from one to the next, and what the variance has less than their covariances promise.
+    fn of_means(&self, step: usize) -> Self {
+        let (count, mut of_means) = (step as f64, Self::white(self.white / step as f64));
+        for &(correlation, variance) in &self.first_order {
+            let share = variance / count;
+            // Of a mean alone: a/r² Σ (r - |l|) ρ^|l|, up to what is forgotten within a mean.
+            let long_run = share * (1.0 + correlation) / (1.0 - correlation);
+            let power = correlation.abs().powf(count);
+            if power < FORGOTTEN {
+                of_means.white += long_run;
+                continue;
+            }
+            let next = if correlation < 0.0 && step % 2 == 1 { -power } else { power };
+            let beside = (1.0 - next) / (1.0 - correlation);
+            let own = long_run - 2.0 * share * correlation * beside / ((1.0 - correlation) * count);
+            let neighbours = share * correlation * beside * beside / (count * next);
+            of_means.first_order.push((next, neighbours));
+            of_means.white += own - neighbours;
+        }
+        of_means
     }
 
     /// The product of the covariances before the filter, over some variance, and a sequence.
@@ -161,6 +199,26 @@ mod tests {
         assert_eq!(CorrelatedNoise::white(2.0).memory(), 0.0);
         assert_eq!(mean.with_part(0.5), CorrelatedNoise::new(1.0, vec![(0.5, 0.5), (0.9, 1.0)]));
         assert!(mean.with_part(0.0).is_white());
+    }
+
+    #[test]
+    fn means_are_correlated_as_the_samples_that_they_are_made_of() {
+        let noise = CorrelatedNoise::new(0.3, vec![(0.05, 1.0), (0.8, 2.0), (0.999, 1.0), (-0.7, 1.5)]);
+        let sequence: Vec<f64> = (0..40).map(|i| (f64::from(i) * 0.1).cos()).collect();
+        for noise in [noise.clone(), noise.behind(vec![0.5, 0.25])] {
+            for step in [1, 3, 9, 27] {
+                let at_samples: Vec<f64> =
+                    sequence.iter().flat_map(|value| std::iter::repeat_n(value / step as f64, step)).collect();
+                let product = noise.correlate(&at_samples);
+                let found = noise.covariances_of_means(&sequence, step);
+                for (index, (found, part)) in found.iter().zip(product.chunks(step)).enumerate() {
+                    let expected = noise.variance() * part.iter().sum::<f64>() / step as f64;
+                    // Of what is forgotten within a mean only the density at low frequencies is known.
+                    let allowed = if index == 0 || index == 39 { 0.02 } else { 2e-3 };
+                    assert!((found / expected - 1.0).abs() < allowed, "{step}, {index}: {found} {expected}");
+                }
+            }
+        }
     }
 
     #[test]
