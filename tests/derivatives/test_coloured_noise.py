@@ -128,6 +128,44 @@ def test_low_passed_noise_is_no_motion(kind: str, name: str) -> None:
     assert (np.mean(covered, axis=0) >= COVERAGE[0]).all(), covered
 
 
+RISING = {"rising": [-0.5], "at both ends": [0.7, -0.5, 0.3, -0.3]}
+"""Poles of noises that are stronger at the highest frequencies than below."""
+
+
+def of_poles(name: str, seed: int) -> Array:
+    """Return autoregressive noise of variance one."""
+    coloured = lfilter([1.0], np.poly(RISING[name]), np.random.default_rng(seed).standard_normal(SAMPLES + 2000))[2000:]
+    return np.asarray(coloured / coloured.std(), dtype=np.float64)
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("name", RISING)
+@pytest.mark.parametrize("kind", ["line", "several sines", *long("constant", "sine")])
+def test_noise_that_rises_to_the_highest_frequencies_is_no_motion(kind: str, name: str) -> None:
+    """No sum of noises that fall explained it: second derivatives of a line were a million times worse, of sines 20 times."""
+    # The error of a constant is the same all along it: each record gives one.
+    seeds = range(10 if kind in {"constant", "line"} else 3)
+    ratios, covered = beside_the_best_filter(motion(kind), [0.03 * of_poles(name, seed) for seed in seeds])
+    assert (np.exp(np.mean(np.log(ratios), axis=0)) <= AT_MOST).all(), ratios
+    assert (np.mean(covered, axis=0) >= COVERAGE[0]).all(), covered
+
+
+@pytest.mark.parametrize("samples", [20_000, *long(200_000)])
+def test_noise_of_density_one_over_frequency_is_no_motion_in_long_records(samples: int) -> None:
+    """It was known down to a period of 4000 samples. What is slower was taken for motion: second derivatives were 7 to 700 times worse."""
+    truth = motion("line", samples)
+    x = np.linspace(-1, 1, samples)
+    ratios, covered = [], []
+    for seed in range(60, 66):
+        y = truth[0] + 0.03 * noise("1/f", seed, samples)
+        fit = tvident.fit_local_polynomials(y, "auto", sample_rate=RATE, max_deriv=1)
+        slope = np.polynomial.Legendre.fit(x, y, 1).deriv()(x) * 2 * RATE / (samples - 1)
+        ratios.append(rms(fit.derivatives[1] - truth[1]) / rms(np.asarray(slope - truth[1])))
+        covered.append([np.mean(np.abs(fit.derivatives[d] - truth[d]) < 1.96 * fit.stderr[d]) for d in (0, 1)])
+    assert np.exp(np.mean(np.log(ratios))) <= AT_MOST, ratios
+    assert np.mean(covered, axis=0).min() > COVERAGE[0], covered
+
+
 @pytest.mark.parametrize("noisy", [0.0, 1e-3, 0.1])
 def test_a_motion_of_limited_band_is_no_noise(noisy: float) -> None:
     # Up to a tenth of the sample rate, as flat as noise below.

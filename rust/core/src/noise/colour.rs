@@ -51,6 +51,9 @@ const CLEARLY: f64 = 6.0;
 const CORNER: f64 = 1.5;
 const OCTAVES: i32 = 11;
 
+/// The corners, as far below the highest frequency as the first of these from zero, of noises that rise towards it: as what comes of differences.
+const RISING: usize = 3;
+
 /// The most windows of a length that are used, and in how many stretches.
 const MOST_WINDOWS: usize = 1 << 14;
 const STRETCHES: usize = 16;
@@ -92,7 +95,7 @@ pub(crate) struct Statistic {
     power: f64,
     deviation: f64,
     kurtosis: f64,
-    /// The power of every noise of variance one: white, then by octave.
+    /// The power of every noise of variance one: white, then by octave, then those that rise.
     of_noises: Arc<[f64]>,
 }
 
@@ -120,7 +123,8 @@ pub(crate) struct Colour {
 /// The noise of a channel, whose variance is given for the case that it is white or that its colour cannot be told.
 pub fn coloured_noise(record: &dyn Samples, variance: f64, instructions: Instructions) -> CorrelatedNoise {
     let measured = measure(record, variance, instructions);
-    let coloured = measured.and_then(|measured| coloured(&measured)).filter(|found| !found.noise.is_white());
+    let coloured =
+        measured.and_then(|measured| coloured(&measured, record.len())).filter(|found| !found.noise.is_white());
     coloured.map_or(CorrelatedNoise::white(variance), |found| found.noise)
 }
 
@@ -152,7 +156,7 @@ fn is_white(measured: &[Statistic]) -> bool {
 
 /// How many of what is measured, from the highest frequencies on, noises explain; `None` where these are too few.
 pub(crate) fn explained(measured: &[Statistic]) -> Option<usize> {
-    let all: Vec<usize> = (0..=corners().count()).collect();
+    let all = all_noises(measured);
     let counts = WHITE..=measured.len();
     let explained = counts.take_while(|&count| explains(&measured[..count], &all).is_some()).last();
     explained.filter(|&explained| explained >= FEWEST)
@@ -160,20 +164,24 @@ pub(crate) fn explained(measured: &[Statistic]) -> Option<usize> {
 
 /// By how much all noises together miss what is measured, squared and summed.
 pub(crate) fn missed(measured: &[Statistic]) -> f64 {
-    fit(measured, &(0..=corners().count()).collect::<Vec<_>>()).0
+    fit(measured, &all_noises(measured)).0
 }
 
-/// The noise that explains what is measured, from the highest frequencies on, or `None`.
-pub(crate) fn coloured(measured: &[Statistic]) -> Option<Colour> {
+fn all_noises(measured: &[Statistic]) -> Vec<usize> {
+    (0..measured.first().map_or(0, |one| one.of_noises.len())).collect()
+}
+
+/// The noise that explains what is measured of so many samples, from the highest frequencies on, or `None`.
+pub(crate) fn coloured(measured: &[Statistic], samples: usize) -> Option<Colour> {
     let explained = explained(measured)?;
     // The last may hold some of the signal that ends the sequence.
     let whole = explained == measured.len();
     let part = &measured[..if whole { explained } else { explained - 1 }];
     let lowest = part[part.len() - 1].frequency;
     let slow = |corner: f64| corner < lowest / if whole { 2.0 } else { 4.0 };
-    let mut used: Vec<usize> = std::iter::once(0)
-        .chain(corners().enumerate().filter(|(_, corner)| !slow(*corner)).map(|(m, _)| m + 1))
-        .collect();
+    let octaves: Vec<f64> = corners().collect();
+    let is_slow = |noise: usize| noise > 0 && octaves.get(noise - 1).is_some_and(|&corner| slow(corner));
+    let mut used: Vec<usize> = all_noises(measured).into_iter().filter(|&noise| !is_slow(noise)).collect();
     let (misfit, mut amounts) = fit(part, &used);
     // Few noises: what scatters at low frequencies would otherwise be taken for a noise of its own.
     loop {
@@ -192,24 +200,24 @@ pub(crate) fn coloured(measured: &[Statistic]) -> Option<Colour> {
             _ => break,
         }
     }
-    let corners: Vec<f64> = corners().collect();
+    let correlations: Vec<f64> = correlations().collect();
     let (mut white, mut first_order) = (0.0, Vec::new());
     for (&one, &amount) in used.iter().zip(&amounts) {
         match one.checked_sub(1) {
             None => white = amount,
-            Some(place) if amount > 0.0 => first_order.push(((-corners[place]).exp(), amount)),
+            Some(place) if amount > 0.0 => first_order.push((correlations[place], amount)),
             Some(_) => {}
         }
     }
-    extend(&mut first_order, white, lowest);
+    extend(&mut first_order, white, (lowest, samples));
     let found = CorrelatedNoise::new(white, first_order);
     let steep = found.density(lowest) > STEEPEST * found.density(8.0 * lowest);
     (!(whole && steep)).then_some(Colour { noise: found, lowest, whole })
 }
 
 /// Continues noise of density `1/f` to lower frequencies than are measured. The noises of one octave after the other have the same variance `a`
-/// then, and the density at `ω` is `π a / (ω ln 2)`.
-fn extend(first_order: &mut Vec<(f64, f64)>, white: f64, lowest: f64) {
+/// then, and the density at `ω` is `π a / (ω ln 2)`. What is slower than the record is an offset.
+fn extend(first_order: &mut Vec<(f64, f64)>, white: f64, (lowest, samples): (f64, usize)) {
     let found = CorrelatedNoise::new(white, first_order.clone());
     let density = |octaves: f64| found.density(lowest * octaves.exp2());
     let falls = [density(0.0) / density(2.0), density(2.0) / density(4.0)];
@@ -219,13 +227,24 @@ fn extend(first_order: &mut Vec<(f64, f64)>, white: f64, lowest: f64) {
     // Few noises make a bumpy line of it.
     let bumps = [0.0, 1.0, 2.0, 3.0].map(|octaves: f64| (density(octaves) * octaves.exp2()).ln());
     let variance = (bumps.iter().sum::<f64>() / 4.0).exp() * lowest * LN_2 / PI;
-    let slower = corners().filter(|&corner| corner < lowest / 2.0);
+    let slower = octaves().skip_while(|&corner| corner >= lowest / 2.0);
+    let slower = slower.take_while(|corner| corner * samples as f64 >= 1.0);
     first_order.extend(slower.map(|corner| ((-corner).exp(), variance)));
 }
 
-/// The corners of the first-order noises.
+/// The corners of first-order noises, and of those that are fitted.
+fn octaves() -> impl Iterator<Item = f64> {
+    (0..).map(|octave| CORNER * f64::from(-octave).exp2())
+}
+
 pub(crate) fn corners() -> impl Iterator<Item = f64> {
-    (0..OCTAVES).map(|octave| CORNER * f64::from(-octave).exp2())
+    (0..OCTAVES).zip(octaves()).map(|(_, corner)| corner)
+}
+
+/// The correlations from sample to sample of the noises that are fitted, those that rise last.
+fn correlations() -> impl Iterator<Item = f64> {
+    let falling = corners().map(|corner| (-corner).exp());
+    falling.chain(corners().take(RISING).map(|corner| -(-corner).exp()))
 }
 
 /// Looks at the noise of a record through some degrees of windows of one length.
@@ -292,7 +311,7 @@ fn powers(basis: &Basis, degrees: &Range<usize>) -> Arc<[f64]> {
         let power = |row: &Vec<f64>| row.iter().zip(noise.correlate(row)).map(|(a, b)| a * b).sum::<f64>();
         rows.iter().map(power).sum::<f64>() / rows.len() as f64
     };
-    let first_order = corners().map(|corner| of(CorrelatedNoise::new(0.0, vec![((-corner).exp(), 1.0)])));
+    let first_order = correlations().map(|correlation| of(CorrelatedNoise::new(0.0, vec![(correlation, 1.0)])));
     std::iter::once(1.0).chain(first_order).collect()
 }
 

@@ -135,12 +135,12 @@ pub fn coloured_or_low_passed_noise(
 ) -> CorrelatedNoise {
     let white = CorrelatedNoise::white(variance);
     let Some(measured) = measure(record, variance, instructions) else { return white };
-    let as_it_is = coloured(&measured).map(|found| found.noise).filter(|noise| !noise.is_white());
-    as_it_is.or_else(|| low_passed(&measured)).unwrap_or(white)
+    let as_it_is = coloured(&measured, record.len()).map(|found| found.noise).filter(|noise| !noise.is_white());
+    as_it_is.or_else(|| low_passed(&measured, record.len())).unwrap_or(white)
 }
 
-/// The noise that explains what is measured behind a filter, or `None`.
-fn low_passed(measured: &[Statistic]) -> Option<CorrelatedNoise> {
+/// The noise that explains what is measured of so many samples behind a filter, or `None`.
+fn low_passed(measured: &[Statistic], samples: usize) -> Option<CorrelatedNoise> {
     let (short, long) = measured.split_at_checked(FEWEST)?;
     let kept = |one: &Statistic| BEHIND.try_get(one.key(), FILTERS_OF_SHORT, || behind_all(one).ok_or(()));
     let short_behind: Vec<BehindAll> = short.iter().map(kept).collect::<Result<_, ()>>().ok()?;
@@ -164,7 +164,7 @@ fn low_passed(measured: &[Statistic]) -> Option<CorrelatedNoise> {
     let nearest = filters.iter().take(NEAREST).filter_map(judged);
     let best = nearest.max_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
     let (_, _, filter, statistics) = best?;
-    let found = coloured(&statistics)?;
+    let found = coloured(&statistics, samples)?;
     let is_seen = BELOW * found.lowest <= filter.corner && (!found.whole || filter.corner >= ALONE);
     is_seen.then(|| found.noise.behind(filter.autocovariances()))
 }
