@@ -94,6 +94,28 @@ fn the_colour_of_noise_is_found_beside_a_signal() {
 }
 
 #[test]
+fn noise_that_rises_to_the_highest_frequencies_is_found_beside_a_signal() {
+    // The last is the sum of two, one of which falls: as strong at both ends, and weak between them.
+    for (falls, rises) in [(0.0, -0.3), (0.0, -0.5), (0.0, -0.7), (0.7, -0.6)] {
+        for amplitude in [0.0, 30.0] {
+            let mut samples = first_order(rises, 7, |i| amplitude * (i * 0.02).sin());
+            let mut first_order_noises = vec![(rises, 1.0)];
+            if falls > 0.0 {
+                samples.iter_mut().zip(first_order(falls, 8, |_| 0.0)).for_each(|(sample, other)| *sample += other);
+                first_order_noises.push((falls, 1.0));
+            }
+            let white = sigma(&samples).powi(2);
+            let found = coloured_noise(&samples.as_slice(), white, Instructions::current());
+            let truth = CorrelatedNoise::new(0.0, first_order_noises);
+            for frequency in [0.05, 0.1, 0.3, 1.0, 2.5] {
+                let ratio = found.density(frequency) / truth.density(frequency);
+                assert!((0.7..=1.4).contains(&ratio), "{falls}, {rises} at {frequency}: {ratio}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_little_colour_is_found_in_short_records() {
     let colour = |samples: &[f64]| coloured_noise(&samples, 1.0, Instructions::current());
     for seed in 0..40 {
