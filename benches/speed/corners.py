@@ -73,6 +73,25 @@ def _regression(count: int = 3, **options: Any) -> Callable[[float], Duel]:
     return prepare
 
 
+def _durations(count: int = 3) -> Callable[[float], Duel]:
+    """Pit windows of a duration at times that scatter, some 201 rows each, against the plain call."""
+
+    def prepare(share: float) -> Duel:
+        regressors, sides = signals.regression(max(_LEAST, int(1_000_000 * share)), count)
+        # Steps that scatter as chance arrivals do: windows hold 150 to 250 rows.
+        t = np.cumsum(np.random.default_rng(24).exponential(1 / signals.RATE, sides.size))
+        return Duel(
+            [
+                lambda: tvident.rolling_least_squares(regressors, sides, "200ms", t=t, workers=1),
+                lambda: tvident.rolling_least_squares(regressors, sides, 201, workers=1),
+            ],
+            _unchecked,
+            sides.size,
+        )
+
+    return prepare
+
+
 def _automatic(**kinds: str) -> Callable[[float], Duel]:
     def prepare(share: float) -> Duel:
         angle, torque = signals.recording(max(_LEAST, int(_FEW_MILLIONS * share)))
@@ -222,6 +241,16 @@ CORNERS = [
             ("half-life-8", "half_life=50, eight regressors", _regression(8, alignment="trailing", half_life=50)),
             ("correlated-8", 'covariance="hac", eight regressors', _regression(8, covariance="hac")),
         )
+    ),
+    *(
+        Row(
+            f"regression-durations{name}",
+            f"`rolling_least_squares` in windows of 200 ms on irregular times, some 200 rows{words}",
+            "the plain call, 201 rows",
+            _durations(count),
+            most=1.5,
+        )
+        for name, words, count in (("", "", 3), ("-1", ", one regressor", 1), ("-5", ", five regressors", 5))
     ),
     Row(
         "irregular",
