@@ -41,7 +41,7 @@ SIDE_BY_SIDE = (
     "--ignore=tests/house/test_parallel.py",
     "--ignore=tests/house/test_times.py",
 )
-"""All tests are run as `make test-python` runs them, but for those that promise a time, which need a machine of their own."""
+"""Tests are run as `make test-python` runs them, without the slow ones, but for those that promise a time, which need a machine alone."""
 
 MADE = ("__pycache__", ".git", ".venv*", ".*_cache", ".hypothesis", ".benchmarks", "target", "dist", "*.so")
 """What stands beside the sources but is made from them."""

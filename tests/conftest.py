@@ -12,7 +12,7 @@ from hypothesis import settings
 
 QUICK, SLOW, LONG = "quick", "slow", "long"
 """What `make test`, `make test-slow` and `make test-long` run: each test is in one of these groups."""
-GROUP = os.environ.get("TVIDENT_TESTS", QUICK)
+GROUP = os.environ.get("TVIDENT_TESTS") or QUICK
 """The group whose tests are run."""
 if GROUP not in (QUICK, SLOW, LONG):
     raise pytest.UsageError(f"TVIDENT_TESTS is {QUICK}, {SLOW} or {LONG}, not {GROUP!r}")

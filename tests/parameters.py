@@ -18,5 +18,5 @@ def long(*values: object) -> list[Any]:
 
 
 def examples(count: int) -> int:
-    """Give how many examples of a slow property are tried: so many in `make test-long`, a quarter in `make test`, more in `make soak`."""
+    """Give how many examples of a slow property are tried: so many in `make test-long`, more in `make soak`, else a quarter."""
     return max(min(count, LEAST), count * settings().max_examples // OF_ALL)

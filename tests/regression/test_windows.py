@@ -283,3 +283,15 @@ def test_a_duration_on_uniform_times_is_a_number_of_rows() -> None:
     np.testing.assert_allclose(
         plain.params[100:-100], tvident.rolling_least_squares(A, b, 51).params[100:-100], rtol=1e-9
     )
+
+
+@pytest.mark.parametrize("alignment", ["centre", "trailing", "leading"])
+def test_windows_of_a_duration_are_the_same_wherever_times_count_from(alignment: Alignment) -> None:
+    generator = np.random.default_rng(5)
+    # Whole parts of 2⁻²⁰ s: seconds since 1970 hold them, too.
+    t = np.cumsum(np.maximum(np.round(generator.exponential(0.01, 400) * 2**20), 1)) / 2**20
+    A, b = generator.standard_normal((400, 2)), generator.standard_normal(400)
+    found = tvident.rolling_least_squares(A, b, "500ms", t=t, alignment=alignment)
+    later = tvident.rolling_least_squares(A, b, "500ms", t=t + 2.0**30, alignment=alignment)
+    for name in ("params", "stderr", "residuals", "status"):
+        assert np.array_equal(getattr(found, name), getattr(later, name), equal_nan=True), name

@@ -58,7 +58,7 @@ def pieces(
     st.sampled_from([(201, 200, 15), (51, 301, 4), (301, 64, 15)]),
     st.sampled_from([1, 5]),
     st.sampled_from([0, 7]),
-    st.sampled_from(["omit", "propagate"]),
+    st.sampled_from(["omit", "propagate", "raise"]),
     st.booleans(),
     st.integers(0, 3),
 )
@@ -72,7 +72,8 @@ def test_windows_beside_gaps_are_those_of_the_batch(
     seed: int,
 ) -> None:
     form = StrongForm(window_length=windows[0], regression_window=windows[1], max_order=windows[2])
-    channels = spoilt(seed, share=0.003 if policy == "omit" else 0.0)
+    # Where nothing may be missing, samples without weight are all the same.
+    channels = (ANGLE, TORQUE) if policy == "raise" else spoilt(seed, share=0.003 if policy == "omit" else 0.0)
     weights = weights_of(seed) if weighted else None
     more: dict[str, Any] = {"nan_policy": policy, "step": step, "sample_rate": 1000, "terms": ()}
     call = {**more, **WINDOWED, "method": form, "quantisation": 0, "weights": weights}
@@ -177,3 +178,38 @@ def test_samples_of_a_stream_all_have_weights_or_none_has() -> None:
     weak = tvident.identify(ANGLE, TORQUE, sample_rate=1000)
     with pytest.raises(ValueError, match="weights in a stream are for the strong form"):
         tvident.IdentificationStream(sample_rate=1000, settings=weak.settings).push(1.0, 1.0, weights=1.0)
+
+
+@pytest.mark.parametrize("value", [1e160, np.nan])
+def test_samples_that_are_too_large_to_be_squared_are_missing(value: float) -> None:
+    angle = ANGLE.copy()
+    angle[900] = value
+    batch = tvident.identify(angle, TORQUE, sample_rate=1000, method="paper")
+    stream = tvident.IdentificationStream(sample_rate=1000, method="paper", nan_policy="omit")
+    outs = [stream.push(angle, TORQUE), stream.finish()]
+    assert np.array_equal(joined(outs, "stiffness"), batch.stiffness, equal_nan=True)
+    lost = angle.copy()
+    lost[900] = np.nan
+    alike = tvident.identify(lost, TORQUE, sample_rate=1000, method="paper")
+    assert np.array_equal(batch.stiffness, alike.stiffness, equal_nan=True)
+    assert np.array_equal(batch.status, alike.status)
+
+
+def test_nothing_stays_of_a_piece_that_is_refused() -> None:
+    stream = tvident.IdentificationStream(sample_rate=1000, method="paper")
+    ones = np.ones(4)
+    with pytest.raises(ValueError, match="as many samples as each other; got 4 and 3"):
+        stream.push(ANGLE[:4], TORQUE[:3], weights=ones)
+    with pytest.raises(ValueError, match="give all of them in one unit"):
+        stream.push(ANGLE[:4], TORQUE[:4], weights=[1e-110, 1, 1, 1])
+    stream.push(ANGLE[:4], TORQUE[:4], weights=ones)
+    other = tvident.IdentificationStream(sample_rate=1000, method="paper")
+    with pytest.raises(ValueError, match="give all of them in one unit"):
+        other.push(ANGLE[:4], TORQUE[:4], weights=[1e-110, 1, 1, 1])
+    assert other.push(ANGLE[:4], TORQUE[:4]).time.size == 0
+    assert other.samples == 4
+    rows = tvident.RollingStream(3)
+    rows.push(np.arange(4.0), ones, weights=ones)
+    with pytest.raises(ValueError, match="give all of them in one unit"):
+        rows.push(np.arange(4.0), ones, weights=[1e110, 1, 1, 1])
+    rows.push(np.arange(4.0), ones, weights=ones)

@@ -225,7 +225,7 @@ def identify(
         Every how many samples a result is wanted.
     nan_policy : {"omit", "propagate", "raise"}, optional
         What to do with values of angle and torque that are not finite. ``"omit"``: only the equations that contain one are removed;
-        parameters around it come from the other equations of their window, with the flag GAP. In strong form, but where all is constant,
+        parameters around it come from the other equations of their window, with the flag GAP. In strong form
         the polynomials of windows that hold short gaps of the angle are fitted on what is there. ``"propagate"``: windowed parameters
         are NaN if their window contains one. ``"raise"``: raise an error.
     settings : mapping, optional

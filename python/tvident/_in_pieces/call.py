@@ -108,9 +108,8 @@ def identify_file(
 
     Notes
     -----
-    With everything windowed in strong form, as with ``method="paper"``, the numbers are those of one call in memory, bit for bit, as long
-    as no sample is missing and none has a weight. A piece with missing samples is identified on its own: its numbers agree to rounding,
-    its standard errors to chance.
+    With everything windowed in strong form, as with ``method="paper"``, the numbers are those of one call in memory, bit for bit, beside
+    missing samples too, as long as none has a weight.
 
     In weak form, and with constants or weights in strong form, every piece is identified as a record of its own with neighbours on both
     sides. What is left to be chosen is chosen once, from at most eight stretches of 65 536 samples spread over the recording; flags and

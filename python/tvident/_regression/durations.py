@@ -66,7 +66,9 @@ def irregular_times(asked: AskedWindows, rows: int) -> Array | None:
                 f"t must increase from row to row; t[{place}] is {times[place]:.9g} after {times[place - 1]:.9g}; sort the rows by time, "
                 "and keep one of each time"
             ) from None
-        return times
+        # From the first row on: seconds since 1970 have no digits left for what a border is told by.
+        since: Array = times - times[0]
+        return since
     return None
 
 

@@ -106,8 +106,9 @@ class InStrongForm:
     factors : list of float, optional
         What standard errors of least squares are multiplied by, where an earlier result says.
     forgetting : float
-    leaves_out : bool
-        Missing samples are left out of windows, which otherwise have no number.
+    nan_policy : str
+        With "omit" missing samples are left out of windows, which otherwise have no number; so are samples without weight but with
+        "propagate".
     """
 
     equation: Equation
@@ -115,7 +116,7 @@ class InStrongForm:
     regression_window: int | None
     factors: list[float] | None
     forgetting: float
-    leaves_out: bool
+    nan_policy: arguments.RowPolicy
 
     def begun(self, step: int, state: Any, *, weighted: bool = False) -> StreamWork:
         """Return the work that begins, or goes on from a state."""
@@ -127,7 +128,7 @@ class InStrongForm:
             step=step,
             factors=self.factors,
             forgetting=self.forgetting,
-            leaves_out=self.leaves_out,
+            leaves_out=self.nan_policy == "omit" or (weighted and self.nan_policy != "propagate"),
             weighted=weighted,
             state=state,
         )
@@ -233,7 +234,7 @@ def _in_strong_form(request: Request, equation: Equation, given: Given, half_lif
         regression_window=None if constant else rows,
         factors=[float(factors[name]) for name in names] if is_same and not constant else None,
         forgetting=0.5 ** (1 / half_life),
-        leaves_out=given.nan_policy == "omit",
+        nan_policy=given.nan_policy,
     )
 
 

@@ -271,7 +271,7 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
             The next samples, any number of them.
         weights : float or array_like, shape (m,), optional
             Weight of every sample, one over the variance of its noise relative to the others, as in :func:`identify`; a sample of weight 0
-            is missing. In strong form; samples of a stream all have weights, or none has.
+            is missing. In strong form; samples of a stream all have weights, or none has. With the first ones :attr:`delay` may grow.
 
         Returns
         -------
@@ -300,7 +300,7 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
             return self._push_weighted(angle, torque, weights)
         if not (self._plain and is_plain(angle) and is_plain(torque)):
             angle, torque = self._channel("angle", angle), self._channel("torque", torque)
-        _check_lengths(angle, torque)
+        _check_sizes(angle.size, torque.size)
         return StreamedIdentification(self._stream.push(angle, torque), self._named)
 
     def _push_weighted(self, angle: Any, torque: Any, weights: npt.ArrayLike | None) -> StreamedIdentification:
@@ -313,6 +313,11 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         # As many as the angle has samples.
         count = np.size(angle)
         given = arguments.some_weights("weights", weights, (count,))
+        _check_sizes(count, np.size(torque))
+        counted = given > 0
+        angle, torque = self._channel("angle", angle, counted), self._channel("torque", torque, counted)
+        unit, relative = self._relative(given)
+        # Nothing stays of a piece that is refused.
         if not self._weighted:
             self._weighted = True
             try:
@@ -320,27 +325,25 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
             except ValueError:
                 self._weighted = False
                 raise
-        counted = given > 0
-        angle, torque = self._channel("angle", angle, counted), self._channel("torque", torque, counted)
-        _check_lengths(angle, torque)
-        relative = self._relative(given)
+        if unit != self._unit:
+            self._unit, self._named = unit, replace(self._named, root=math.sqrt(unit))
         # What has no weight is missing.
         angle, torque = (np.where(counted, channel, np.nan) for channel in (angle, torque))
         return StreamedIdentification(self._stream.push(angle, torque, relative), self._named)
 
-    def _relative(self, weights: Numbers) -> Numbers:
-        """Return weights over the first that is not zero."""
-        if self._unit == 0.0 and weights.any():
-            self._unit = float(weights[np.argmax(weights > 0)])
-            self._named = replace(self._named, root=math.sqrt(self._unit))
+    def _relative(self, weights: Numbers) -> tuple[float, Numbers]:
+        """Return the first weight that is not zero, 0 before there is one, and weights over it."""
+        unit = self._unit
+        if unit == 0.0 and weights.any():
+            unit = float(weights[np.argmax(weights > 0)])
         largest = float(weights.max(initial=0.0))
-        if largest > MOST_OF_FIRST * self._unit:
+        if largest > MOST_OF_FIRST * unit:
             raise ValueError(
                 f"weights of a stream must be at most {MOST_OF_FIRST:.0e} times the first that is not 0; got {largest:.3g} after "
-                f"{self._unit:.3g}; give all of them in one unit"
+                f"{unit:.3g}; give all of them in one unit"
             )
         with np.errstate(under="ignore"):
-            return weights / (self._unit or 1.0)
+            return unit, weights / (unit or 1.0)
 
     def _channel(
         self, name: Literal["angle", "torque"], values: Any, counted: npt.NDArray[np.bool_] | None = None
@@ -361,9 +364,9 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         return f"<IdentificationStream of {names} after {self.samples} samples, {self._progress()}>"
 
 
-def _check_lengths(angle: npt.NDArray[Any], torque: npt.NDArray[Any]) -> None:
+def _check_sizes(angle: int, torque: int) -> None:
     """Check that both channels have as many samples."""
-    if angle.size != torque.size:
+    if angle != torque:
         raise ValueError(
-            f"angle and torque must have as many samples as each other; got {angle.size} and {torque.size}; push them together"
+            f"angle and torque must have as many samples as each other; got {angle} and {torque}; push them together"
         )

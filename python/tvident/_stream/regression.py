@@ -104,7 +104,8 @@ class RollingStream(Stream[StreamedRegression]):
     A row that comes alone costs one merge of two factors and one solution, whatever the window; the first row after every
     `window_length` rows costs that many appends more. Many rows at a time are solved side by side, as in a batch. A stream pickles with
     the rows of at most two windows, and goes on where it was. With ``covariance="hac"`` windows are solved once every `window_length`
-    rows, together with their neighbours: all of it costs some six times as much, and a stream keeps the rows of some seven windows.
+    rows, together with their neighbours: rows that come alone cost what they do otherwise on average, the last of each `window_length` all
+    of it, and many rows at a time some six times as much. A stream keeps the rows of some seven windows.
 
     References
     ----------
@@ -254,26 +255,28 @@ class RollingStream(Stream[StreamedRegression]):
             windows = self._windows
             least_given(windows.at_least, windows.rows, shape[0])
             half_life_given(windows.half_life, 1.0, windows.alignment, windows.rows, shape[0])
-            self._shape, self._one_rhs = shape, rhs.ndim == 1
+        # Nothing stays of rows that are refused.
+        relative = None if weight is None else self._relative(weight)
+        if self._stream is None:
+            self._shape, self._one_rhs = _shape_of(regressors, rhs), rhs.ndim == 1
             self._weighted = weight is not None
             self._stream = self._begun(None)
         columns = rhs[:, np.newaxis] if rhs.ndim == 1 else rhs
-        return self._given(
-            self._stream.push(regressors.T, columns.T, None if weight is None else self._relative(weight))
-        )
+        return self._given(self._stream.push(regressors.T, columns.T, relative))
 
     def _relative(self, weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Return weights over the unit of the first that are not zero."""
-        largest = float(weights.max(initial=0.0))
-        if self._unit == 0.0 and largest > 0.0:
-            self._unit = unit_of_weights(weights)
-        if largest > _MOST_WEIGHT * self._unit:
+        largest, unit = float(weights.max(initial=0.0)), self._unit
+        if unit == 0.0 and largest > 0.0:
+            unit = unit_of_weights(weights)
+        if largest > _MOST_WEIGHT * unit:
             raise ValueError(
                 f"weights of a stream must be at most {_MOST_WEIGHT:.0e} times the first that are not 0; got {largest:.3g} after weights "
-                f"near {self._unit:.3g}; give all of them in one unit"
+                f"near {unit:.3g}; give all of them in one unit"
             )
+        self._unit = unit
         with np.errstate(under="ignore"):
-            return weights / (self._unit or 1.0)
+            return weights / (unit or 1.0)
 
     def _check_end(self) -> None:
         """Check that rows have come."""

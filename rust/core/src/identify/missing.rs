@@ -12,11 +12,15 @@ const PIECE: usize = 1 << 11;
 /// Samples between two looks at the watch: some milliseconds.
 const WATCHED: usize = 1 << 20;
 
-/// Numbers of the samples at which angle or torque holds no finite number, in order.
+/// Numbers of the samples at which angle or torque is not there, in order: holds no finite number, say.
 ///
 /// # Errors
 /// If the watch cancels.
-pub(crate) fn holes(motion: &Motion<'_>, watch: &mut Watch<'_>) -> Result<Vec<usize>, Error> {
+pub(crate) fn holes(
+    motion: &Motion<'_>,
+    is_there: impl Fn(f64) -> bool,
+    watch: &mut Watch<'_>,
+) -> Result<Vec<usize>, Error> {
     let samples = motion.angle.len();
     let most = PIECE.min(samples);
     let (mut angle, mut torque) = (vec![0.0; most], vec![0.0; most]);
@@ -30,9 +34,9 @@ pub(crate) fn holes(motion: &Motion<'_>, watch: &mut Watch<'_>) -> Result<Vec<us
         motion.angle.read(first, angle);
         motion.torque.read(first, torque);
         // No early return, so that the loop becomes vector instructions.
-        let finite = angle.iter().chain(&*torque).fold(true, |all, value| all & value.is_finite());
-        if !finite {
-            let lost = |&place: &usize| !angle[place].is_finite() || !torque[place].is_finite();
+        let whole = angle.iter().chain(&*torque).fold(true, |all, value| all & is_there(*value));
+        if !whole {
+            let lost = |&place: &usize| !is_there(angle[place]) || !is_there(torque[place]);
             holes.extend((0..count).filter(lost).map(|place| first + place));
         }
     }

@@ -15,6 +15,7 @@ use crate::identify::options::{Method, Options, StrongForm, Task};
 use crate::identify::strong::constant::constants;
 use crate::identify::strong::streaming::StrongRecord;
 use crate::identify::strong::windowed::windows;
+use crate::record::samples::is_usable;
 
 /// How a record in strong form is worked on, and whether missing samples are left out of its windows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,7 +97,7 @@ fn alone(
         }
     };
     if options.propagate {
-        let mut holes = holes(&task.motion, &mut |_, total| watch(total, total))?;
+        let mut holes = holes(&task.motion, f64::is_finite, &mut |_, total| watch(total, total))?;
         // What has no weight is left out, whatever it holds.
         holes.retain(|&sample| task.weights.is_none_or(|weights| weights[sample] > 0.0));
         if !holes.is_empty() {
@@ -140,7 +141,8 @@ fn route(task: &Task<'_>, options: &Options, watch: &mut Watch<'_>) -> Result<Ro
         return Ok(whole);
     };
     // Of a part of a record not all is there to be looked at.
-    let leaves_out = !options.propagate && (options.wanted.is_some() || !holes(&task.motion, watch)?.is_empty());
+    let leaves_out =
+        !options.propagate && (options.wanted.is_some() || !holes(&task.motion, is_usable, watch)?.is_empty());
     Ok(Route { pieces, leaves_out })
 }
 
