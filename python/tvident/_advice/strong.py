@@ -141,7 +141,7 @@ class ExplainedStrong:
         )
 
     def _nothing(self) -> list[str]:
-        if not (self.status & Status.RANK_DEFICIENT != 0).any() or self._is_missing():
+        if self._is_missing():
             return ["no window holds enough equations: look for missing values, use shorter windows, or record longer"]
         return [
             (
@@ -152,8 +152,9 @@ class ExplainedStrong:
         ]
 
     def _is_missing(self) -> bool:
-        """Return whether every window lacks samples."""
-        return bool((self.status & Status.GAP != 0).all())
+        """Return whether every window lacks samples that determines nothing."""
+        alone = self.status & (Status.RANK_DEFICIENT | Status.GAP) == Status.RANK_DEFICIENT
+        return not alone.any()
 
     def _undetermined(self) -> list[str]:
         # Where samples are missing, or the mask left them out, that is the reason.
