@@ -153,13 +153,10 @@ class ExplainedStrong:
 
     def _is_missing(self) -> bool:
         """Return whether every window lacks samples that determines nothing."""
-        alone = self.status & (Status.RANK_DEFICIENT | Status.GAP) == Status.RANK_DEFICIENT
-        return not alone.any()
+        return not _lacks_motion(self.status).any()
 
     def _undetermined(self) -> list[str]:
-        # Where samples are missing, or the mask left them out, that is the reason.
-        alone = self._flags & (Status.RANK_DEFICIENT | Status.GAP) == Status.RANK_DEFICIENT
-        share = float(np.mean(alone))
+        share = float(np.mean(_lacks_motion(self._flags)))
         if share < _OFTEN / 2:
             return []
         return [
@@ -246,6 +243,11 @@ class ExplainedStrong:
                 "resampled; orders mean little there"
             )
         return words
+
+
+def _lacks_motion(status: npt.NDArray[np.uint16]) -> npt.NDArray[np.bool_]:
+    """Return which windows lack rank though they have their samples: missing samples, or a mask, would be the reason."""
+    return np.asarray(status & (Status.RANK_DEFICIENT | Status.GAP) == Status.RANK_DEFICIENT)
 
 
 def _spread(places: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
+from tvident._identify import MOST_OF_FIRST
 from tvident._regression import (
     MOST_REGRESSORS,
     Alignment,
@@ -43,10 +44,6 @@ class StreamedRegression:
     rss: npt.NDArray[np.float64]
     condition: npt.NDArray[np.float64]
     status: npt.NDArray[np.uint16]
-
-
-_MOST_WEIGHT = 1e100
-"""Times the first weights of a stream that later ones may be: sums of squares stay within the range of doubles."""
 
 
 class RollingStream(Stream[StreamedRegression]):
@@ -250,15 +247,15 @@ class RollingStream(Stream[StreamedRegression]):
                 f"rows of a stream must all have weights, or none of them; got some {'with' if weight is not None else 'without'} after "
                 f"others {'without' if weight is not None else 'with'}; give weights of 1 where all rows count the same"
             )
+        shape = self._shape or _shape_of(regressors, rhs)
         if self._stream is None:
-            shape = _shape_of(regressors, rhs)
             windows = self._windows
             least_given(windows.at_least, windows.rows, shape[0])
             half_life_given(windows.half_life, 1.0, windows.alignment, windows.rows, shape[0])
         # Nothing stays of rows that are refused.
         relative = None if weight is None else self._relative(weight)
         if self._stream is None:
-            self._shape, self._one_rhs = _shape_of(regressors, rhs), rhs.ndim == 1
+            self._shape, self._one_rhs = shape, rhs.ndim == 1
             self._weighted = weight is not None
             self._stream = self._begun(None)
         columns = rhs[:, np.newaxis] if rhs.ndim == 1 else rhs
@@ -269,9 +266,9 @@ class RollingStream(Stream[StreamedRegression]):
         largest, unit = float(weights.max(initial=0.0)), self._unit
         if unit == 0.0 and largest > 0.0:
             unit = unit_of_weights(weights)
-        if largest > _MOST_WEIGHT * unit:
+        if largest > MOST_OF_FIRST * unit:
             raise ValueError(
-                f"weights of a stream must be at most {_MOST_WEIGHT:.0e} times the first that are not 0; got {largest:.3g} after weights "
+                f"weights of a stream must be at most {MOST_OF_FIRST:.0e} times the first that are not 0; got {largest:.3g} after weights "
                 f"near {unit:.3g}; give all of them in one unit"
             )
         self._unit = unit

@@ -43,7 +43,8 @@ const TOGETHER: usize = 1 << 14;
 /// Degrees that are tested together: a band of frequencies. Where a motion adds less to a band than its noise, no polynomial gains by following it.
 const GROUP: usize = 4;
 
-/// What is left may exceed the noise by so many standard deviations, the cube roots of mean squares taken, and white noise and coloured noise at low frequencies are known to so much.
+/// What is left may exceed the noise by so many standard deviations, the cube roots of mean squares taken, and white noise and coloured noise at
+/// low frequencies are known to so much.
 const CHANCE: f64 = 3.0;
 const WHITE: f64 = 0.05;
 const COLOURED: f64 = 0.25;

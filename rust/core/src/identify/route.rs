@@ -148,9 +148,10 @@ fn route(task: &Task<'_>, options: &Options, watch: &mut Watch<'_>) -> Result<Ro
 
 /// Makes deviations of residuals those of a sample of mean weight, whatever the unit of the weights.
 fn of_mean_weight(found: &mut Identification, weights: Option<&[f64]>) {
-    let counted: Vec<f64> = weights.unwrap_or_default().iter().copied().filter(|weight| *weight > 0.0).collect();
-    if !counted.is_empty() {
-        let root = (counted.iter().sum::<f64>() / counted.len() as f64).sqrt();
+    let counted = weights.unwrap_or_default().iter().filter(|weight| **weight > 0.0);
+    let (sum, count) = counted.fold((0.0, 0_usize), |(sum, count), weight| (sum + weight, count + 1));
+    if count > 0 {
+        let root = (sum / count as f64).sqrt();
         found.residual_std.iter_mut().for_each(|deviation| *deviation /= root);
     }
 }

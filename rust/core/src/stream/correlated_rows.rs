@@ -12,9 +12,8 @@ use crate::least_squares::bandwidth::Bandwidth;
 use crate::least_squares::correlated::CorrelatedScratch;
 use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares};
 use crate::record::samples::Samples;
-use crate::stream::polynomials::PIECE;
 use crate::stream::rolling::RollingState;
-use crate::stream::rows::RecentRows;
+use crate::stream::rows::{RecentRows, in_pieces};
 
 /// Windows of rows that come piece by piece, as [`RollingLeastSquares::run_correlated`] solves them with given lags.
 ///
@@ -59,17 +58,12 @@ impl CorrelatedStream {
     ) -> Result<Self, Error> {
         plan.normal = true;
         plan.ask_for_scratch(1)?;
-        let columns = plan.columns() + usize::from(weighted);
-        let rows = if weighted {
-            RecentRows::weighted(columns, state.first, state.rows)
-        } else {
-            RecentRows::new(columns, state.first, state.rows)
-        };
+        let rows = RecentRows::of(plan.columns(), weighted, state.first, state.rows);
         let made = state.given - state.given % plan.window();
         let mut stream = Self {
             bandwidth: Bandwidth::given(lags + 1, plan.regressors),
             scratch: CorrelatedScratch::new(&plan),
-            column: vec![Vec::new(); columns],
+            column: vec![Vec::new(); plan.columns() + usize::from(weighted)],
             found: SolvedWindows { first: made, ..SolvedWindows::default() },
             ended: state.ended,
             given: state.given,
@@ -128,18 +122,14 @@ impl CorrelatedStream {
     /// Takes in rows, one record a column and the weights last where there are any, and gives the windows of
     /// [`CorrelatedStream::upcoming`]. The elements of the outputs must begin with the first that is given.
     pub fn push(&mut self, columns: &[&dyn Samples], regressions: &mut Regressions<'_>) {
-        let total = columns.first().map_or(0, |column| column.len());
-        for from in (0..total).step_by(PIECE) {
-            let count = PIECE.min(total - from);
-            for (held, column) in self.column.iter_mut().zip(columns) {
-                held.resize(count, 0.0);
-                column.read(from, held);
-            }
-            self.rows.extend(count, self.column.iter().map(Vec::as_slice));
+        let mut held = std::mem::take(&mut self.column);
+        in_pieces(columns, &mut held, |count, held| {
+            self.rows.extend(count, held.iter().map(Vec::as_slice));
             self.make();
             self.give(self.upcoming(0), regressions);
             self.rows.forget_before(self.needed_from(self.given));
-        }
+        });
+        self.column = held;
     }
 
     /// Ends the stream and gives the windows of [`CorrelatedStream::at_end`].

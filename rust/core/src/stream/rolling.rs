@@ -8,8 +8,7 @@ use crate::least_squares::one_by_one::OneByOne;
 use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares};
 use crate::least_squares::side_by_side::RollingScratch;
 use crate::record::samples::Samples;
-use crate::stream::polynomials::PIECE;
-use crate::stream::rows::RecentRows;
+use crate::stream::rows::{RecentRows, in_pieces};
 
 /// Windows of rows that come piece by piece.
 ///
@@ -60,8 +59,7 @@ impl RollingStream {
     /// # Errors
     /// As [`RollingStream::new`].
     pub fn resume(plan: RollingLeastSquares, step: usize, state: RollingState) -> Result<Self, Error> {
-        let columns = plan.columns();
-        Self::of_rows(plan, step, false, state.given, state.ended, RecentRows::new(columns, state.first, state.rows))
+        Self::with_weights(plan, step, false, state)
     }
 
     /// Begins a stream whose rows have weights, one more record beside the columns, or goes on from its state. Weights are finite and not
@@ -70,27 +68,20 @@ impl RollingStream {
     /// # Errors
     /// As [`RollingStream::new`].
     pub fn weighted(plan: RollingLeastSquares, step: usize, state: RollingState) -> Result<Self, Error> {
-        let columns = plan.columns() + 1;
-        Self::of_rows(
-            plan,
-            step,
-            true,
-            state.given,
-            state.ended,
-            RecentRows::weighted(columns, state.first, state.rows),
-        )
+        Self::with_weights(plan, step, true, state)
     }
 
-    fn of_rows(
+    /// A stream whose rows have weights, or not.
+    pub(crate) fn with_weights(
         plan: RollingLeastSquares,
         step: usize,
         weighted: bool,
-        given: usize,
-        ended: bool,
-        rows: RecentRows,
+        state: RollingState,
     ) -> Result<Self, Error> {
         plan.ask_for_scratch(1)?;
         let walk = OneByOne::new(&plan);
+        let RollingState { first, rows, given, ended } = state;
+        let rows = RecentRows::of(plan.columns(), weighted, first, rows);
         let end = ended.then(|| rows.len());
         let column = vec![Vec::new(); plan.columns() + usize::from(weighted)];
         Ok(Self { plan, step, weighted, first: 0, end, rows, given, walk, side_by_side: None, column })
@@ -137,19 +128,11 @@ impl RollingStream {
     ///
     /// The elements of the outputs must begin with the first that is given.
     pub fn push(&mut self, columns: &[&dyn Samples], regressions: &mut Regressions<'_>) {
-        let total = columns.first().map_or(0, |column| column.len());
-        let mut from = 0;
-        while from < total {
-            let count = PIECE.min(total - from);
-            let mut held = std::mem::take(&mut self.column);
-            for (held, column) in held.iter_mut().zip(columns) {
-                held.resize(count, 0.0);
-                column.read(from, held);
-            }
+        let mut held = std::mem::take(&mut self.column);
+        in_pieces(columns, &mut held, |count, held| {
             self.push_rows(count, held.iter().map(Vec::as_slice), regressions);
-            self.column = held;
-            from += count;
-        }
+        });
+        self.column = held;
     }
 
     /// The same with columns that are in memory, as long as one piece.

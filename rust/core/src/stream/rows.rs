@@ -2,6 +2,7 @@
 
 use crate::least_squares::one_by_one::RowSource;
 use crate::record::samples::{Samples, is_usable};
+use crate::stream::polynomials::PIECE;
 
 /// Rows that are still needed, row by row.
 #[derive(Clone, Debug)]
@@ -19,18 +20,28 @@ pub(crate) struct RecentRows {
     without_weight: Vec<usize>,
 }
 
+/// Reads records piece by piece into columns, and gives the number of rows and the columns of each.
+pub(crate) fn in_pieces(records: &[&dyn Samples], columns: &mut [Vec<f64>], mut take: impl FnMut(usize, &[Vec<f64>])) {
+    let total = records.first().map_or(0, |record| record.len());
+    for from in (0..total).step_by(PIECE) {
+        let count = PIECE.min(total - from);
+        for (column, record) in columns.iter_mut().zip(records) {
+            column.resize(count, 0.0);
+            record.read(from, column);
+        }
+        take(count, columns);
+    }
+}
+
 impl RecentRows {
     /// Rows of so many columns from number `first` on.
     pub(crate) fn new(columns: usize, first: usize, values: Vec<f64>) -> Self {
         Self::of(columns, false, first, values)
     }
 
-    /// The same where the last column holds the weights.
-    pub(crate) fn weighted(columns: usize, first: usize, values: Vec<f64>) -> Self {
-        Self::of(columns, true, first, values)
-    }
-
-    fn of(columns: usize, weighted: bool, first: usize, values: Vec<f64>) -> Self {
+    /// The same, with one column more for the weights where there are any.
+    pub(crate) fn of(columns: usize, weighted: bool, first: usize, values: Vec<f64>) -> Self {
+        let columns = columns + usize::from(weighted);
         let (unusable, without_weight) = (Vec::new(), Vec::new());
         let mut rows = Self { columns, weighted, first, values, unusable, without_weight };
         rows.note_unusable(first);

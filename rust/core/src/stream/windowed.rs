@@ -322,11 +322,7 @@ impl WindowedStream {
             scattering.resume((*next, *patience, numbers));
         }
         let first = derivatives.before_centre();
-        let windows = if samples.weighted {
-            RollingStream::weighted(plan, step, state.windows)?
-        } else {
-            RollingStream::resume(plan, step, state.windows)?
-        };
+        let windows = RollingStream::with_weights(plan, step, samples.weighted, state.windows)?;
         Ok(Self {
             rows: StreamedRows::resume(derivatives, motion, samples, &state.rows)?,
             windows: windows.with_equations_from(first),
