@@ -18,6 +18,8 @@ pub(crate) const LONGER: f64 = 1.05;
 const MARGIN: f64 = 1.5;
 /// A constant is another one than the plateau's beyond so many standard errors of both.
 pub const OTHER_CONSTANT: f64 = 4.0;
+/// The same beyond which another look is worth it.
+const IN_DOUBT: f64 = 2.0;
 /// From so many widths on there has to be a plateau.
 const ENOUGH_WIDTHS: usize = 6;
 
@@ -161,6 +163,26 @@ impl Scan {
         let differences = self.scales[plateau.first..=plateau.last].iter().map(from);
         let most = differences.max_by(|one, other| beyond(one).total_cmp(&beyond(other)))?;
         Some(std::iter::repeat_n(0.0, slow).chain(most).collect())
+    }
+
+    /// Whether widths disagree, or the constant of an unknown is not theirs, beyond so many of their errors.
+    fn is_beside(&self, constants: &[(usize, f64)], errors: f64) -> bool {
+        let Some(one) = self.narrowest().filter(|_| !self.has_no_plateau()) else { return true };
+        let off = |&(unknown, value): &(usize, f64)| {
+            let place = self.unknowns.iter().position(|&one| one == unknown);
+            place.is_some_and(|place| (one.values[place] - value).abs() > errors * one.errors[place])
+        };
+        self.agreement != Agreement::WithinErrors || constants.iter().any(off)
+    }
+
+    /// Whether constants of some unknowns may contradict the widths: another look is worth it.
+    pub(crate) fn is_in_doubt(&self, constants: &[(usize, f64)]) -> bool {
+        self.is_beside(constants, IN_DOUBT)
+    }
+
+    /// Whether widths agree, and on these constants.
+    pub(crate) fn confirms(&self, constants: &[(usize, f64)]) -> bool {
+        !self.is_beside(constants, OTHER_CONSTANT)
     }
 
     /// Whether a constant is not what the plateau says, by more than chance and a part of it.

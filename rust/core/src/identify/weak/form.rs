@@ -376,6 +376,7 @@ impl Session<'_, '_, '_> {
     fn finished(&mut self, chosen: Chosen, model: &Model) -> Result<WeakIdentified, Error> {
         let samples = self.record.angle.len();
         let ((chosen, decided, lag), before) = self.settled_with_followed(chosen, model)?;
+        self.scan_between_jumps(&chosen, &decided)?;
         // What is followed explains that widths disagreed beside constants only where nothing is left.
         let before = before.filter(|_| decided.error >= BADLY);
         let (mut found, at_rows) = self.report(chosen, &decided, before.as_ref())?;

@@ -4,12 +4,14 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::identify::options::WidthFrom;
-use crate::identify::scanned::{Scans, wider};
+use crate::identify::scanned::{Scan, Scans, wider};
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decide::{BADLY, BETTER};
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
 use crate::identify::widths::{MOST_SAMPLES, OfWidth, STRETCHES, Widths};
+use crate::inference::jumps::jump::Jump;
+use crate::inference::jumps::search::rows_over;
 use crate::regression::model::Model;
 use crate::regression::subsample::{places_of, stretches_of_blocks};
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
@@ -40,7 +42,7 @@ impl Session<'_, '_, '_> {
         }
         let scans = match scans {
             Some(scans) => scans,
-            None => scans.insert(self.scan(model, chosen.weak.function.half_width())?),
+            None => scans.insert(self.scan(model, chosen.weak.function.half_width(), &[])?),
         };
         let before = chosen.weak.function.half_width();
         let moved = if given {
@@ -103,26 +105,54 @@ impl Session<'_, '_, '_> {
     }
 
     /// The same test function, or the first wider one of the plateau that predicts much better, where windows are hardly longer than it and predict
-    /// badly: while nothing is known of jumps yet, such windows may lose least of all at them, and hide them.
+    /// badly: while nothing is known of jumps yet, such windows may lose least of all at them, and hide them. Where the torque has a lag, whatever the windows
+    /// are, and on to wider ones as long as each predicts much better: what else a filter does is least in slow motion, and while it is more than noise nothing
+    /// is found of jumps.
     fn without_hidden_jumps(&mut self, tried: Chosen, widest: usize, model: &Model) -> Result<Chosen, Error> {
-        let hides = |fitted: &&Decided| fitted.has_windows_of_a_function(&tried.weak) && fitted.error > BADLY;
-        let Some(error) = tried.fitted.as_ref().filter(hides).map(|fitted| fitted.error) else { return Ok(tried) };
+        let is_late = self.finds_lag() || self.options.lag.is_some_and(|lag| lag != 0.0);
+        let hides =
+            |fitted: &&Decided| fitted.error > BADLY && (is_late || fitted.has_windows_of_a_function(&tried.weak));
+        let Some(mut error) = tried.fitted.as_ref().filter(hides).map(|fitted| fitted.error) else { return Ok(tried) };
         let mut width = 2 * tried.weak.function.half_width();
-        while !self.scan.has_no_plateau() && width <= widest {
+        let (mut best, mut is_wider) = (tried, false);
+        while error > BADLY && !self.scan.has_no_plateau() && width <= widest {
             let mut wider = self.chosen_with(width, model)?;
             let fitted = self.fit_first(&wider, model)?;
             if fitted.error < BETTER * error {
-                wider.fitted = Some(fitted);
-                return Ok(wider);
+                (error, wider.fitted) = (fitted.error, Some(fitted));
+                (best, is_wider) = (wider, true);
+                if !is_late {
+                    break;
+                }
+            } else if is_wider {
+                break;
             }
             width *= 2;
         }
-        Ok(tried)
+        Ok(best)
     }
 
-    /// Estimates what is constant with test functions of all widths, and looks for widths that agree. Of a long record those are tried that the samples
-    /// that are scanned have room for, and some that are wider than what the spectra suggest.
-    fn scan(&mut self, model: &Model, suggested: usize) -> Result<Scans, Error> {
+    /// Compares widths once more where windowed unknowns jump and widths were compared as if they did not: in a block that holds a jump a line follows it,
+    /// which moves constants with every width alike. The second comparison stands if it confirms the constants.
+    pub(crate) fn scan_between_jumps(&mut self, chosen: &Chosen, decided: &Decided) -> Result<(), Error> {
+        let Some(fit) = decided.fit.as_ref().filter(|_| self.scan.tried > 0) else { return Ok(()) };
+        let beside_constants = decided.jumps.iter().all(|jump| !jump.of_constants);
+        let values = fit.pooled.values.iter().copied();
+        let constants: Vec<(usize, f64)> = decided.model.constant.iter().copied().zip(values).collect();
+        if decided.jumps.is_empty() || !beside_constants || !self.scan.is_in_doubt(&constants) {
+            return Ok(());
+        }
+        let used = chosen.weak.function.half_width();
+        let again = self.scan(&self.model(), used, &decided.jumps)?.with(used);
+        if again.confirms(&constants) {
+            self.scan = Scan { moved: self.scan.moved, ..again };
+        }
+        Ok(())
+    }
+
+    /// Estimates what is constant with test functions of all widths, and looks for widths that agree, in blocks that hold none of some jumps. Of a long
+    /// record those are tried that the samples that are scanned have room for, and some that are wider than what the spectra suggest.
+    fn scan(&mut self, model: &Model, suggested: usize, jumps: &[Jump]) -> Result<Scans, Error> {
         let samples = self.record.angle.len();
         let noise = self.noise[0];
         let mut widths = Widths::new(model, noise, || Ok(self.evidence(spectrum_length(samples, 200))?.period()))?;
@@ -130,7 +160,7 @@ impl Session<'_, '_, '_> {
         let mut half = LEAST_HALF_WIDTH;
         while 2 * half < widest {
             let function = TestFunction::new(half, self.options.exponent.unwrap_or(EXPONENT), self.options.delta)?;
-            let (weak, stretches) = self.rows_to_scan(function)?;
+            let (weak, stretches) = self.rows_to_scan(function, jumps)?;
             let one = OfWidth {
                 rows: &weak.rows,
                 stretches: &stretches,
@@ -144,8 +174,8 @@ impl Session<'_, '_, '_> {
         Ok(widths.plateaus_or_alike())
     }
 
-    /// Rows of all of a record, or of stretches of a long one, and where the stretches begin and end among them.
-    fn rows_to_scan(&mut self, function: TestFunction) -> Result<(WeakRows, Vec<Range<usize>>), Error> {
+    /// Rows of all of a record, or of stretches of a long one, without those over jumps, and where stretches begin and end among them: at jumps, too.
+    fn rows_to_scan(&mut self, function: TestFunction, jumps: &[Jump]) -> Result<(WeakRows, Vec<Range<usize>>), Error> {
         let samples = self.record.angle.len();
         let count = WeakRows::count(function, samples);
         let stretches = if samples <= 2 * MOST_SAMPLES {
@@ -154,10 +184,60 @@ impl Session<'_, '_, '_> {
             Some(stretches_of_blocks(count, MOST_SAMPLES / function.stride(), STRETCHES))
         };
         let (record, delta, workers) = (&self.record, self.options.delta, self.stages.workers);
-        let weak = self
+        let mut weak = self
             .stages
             .stage(|watch| WeakRows::build(record, function, delta, stretches.as_deref(), workers, watch))?;
-        let places = places_of(stretches.as_deref().unwrap_or(std::slice::from_ref(&(0..count))));
+        let stretches = stretches.unwrap_or_else(|| std::iter::once(0..count).collect());
+        let mut places = places_of(&stretches);
+        if !jumps.is_empty() {
+            let among = |row: usize| among(&stretches, row);
+            let (first, stride) = (weak.first, weak.stride);
+            let over = rows_over(jumps, &weak.kernels.values[2], (first, stride, 1), count);
+            weak.rows.exclude(over.filter_map(among));
+            let cuts = jumps.iter().map(|jump| jump.sample.saturating_sub(first).div_ceil(stride));
+            places = cut(&places, cuts.filter_map(among));
+        }
         Ok((weak, places))
+    }
+}
+
+/// Which of the rows in stretches, one after another, a row of the record is.
+fn among(stretches: &[Range<usize>], row: usize) -> Option<usize> {
+    let mut before = 0;
+    for stretch in stretches {
+        if stretch.contains(&row) {
+            return Some(before + row - stretch.start);
+        }
+        before += stretch.len();
+    }
+    None
+}
+
+/// Ranges that end before some places within them, in ascending order, and begin again there.
+fn cut(ranges: &[Range<usize>], places: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
+    let mut ends: Vec<usize> = ranges.iter().map(|range| range.end).chain(places).collect();
+    ends.sort_unstable();
+    ends.dedup();
+    let begin = ranges.first().map_or(0, |range| range.start);
+    let starts = std::iter::once(begin).chain(ends.iter().copied());
+    starts.zip(&ends).map(|(start, &end)| start..end).filter(|range| !range.is_empty()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stretches_are_cut_where_something_jumps_and_rows_between_them_are_none() {
+        let stretches = [10..30, 40..50];
+        assert_eq!(
+            [9, 10, 29, 30, 39, 40, 49].map(|row| among(&stretches, row)),
+            [None, Some(0), Some(19), None, None, Some(20), Some(29)]
+        );
+        let places = || places_of(&stretches);
+        assert_eq!(places(), [0..20, 20..30]);
+        assert_eq!(cut(&places(), [5, 25].into_iter()), [0..5, 5..20, 20..25, 25..30]);
+        assert_eq!(cut(&places(), [0, 20, 30].into_iter()), [0..20, 20..30]);
+        assert_eq!(cut(&places(), std::iter::empty()), [0..20, 20..30]);
     }
 }
