@@ -8,8 +8,10 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 import pytest
+from click.testing import CliRunner
 
 import tvident
+from tvident._command_line import main
 
 T = np.arange(500) / 250
 
@@ -150,3 +152,55 @@ def test_one_of_several_devices_is_asked_for(tmp_path: Path) -> None:
         recording["q"]
     assert recording["B.q"][0] == 3.5
     assert recording["B.q [°]"].unit == "°"
+
+
+@pytest.mark.parametrize(
+    ("line", "rate"),
+    [
+        ("Abtastrate: 500 Hz", 500.0),
+        ("Sampling rate: 500 Hz", 500.0),
+        ("# sampling frequency = 0.5 kHz", 500.0),
+        ("Sample Rate [Hz],500,500", 500.0),
+        ("Sample rate,512.5", 512.5),
+        ("Abtastfrequenz: 1,2 kHz", 1200.0),
+        ("Sampling interval = 2 ms", 500.0),
+        ("Abtastzeit;2,5;ms", 400.0),
+        ("Fréquence d'échantillonnage : 2 kS/s", 2000.0),
+        ("Sampling rate: 1,000 Hz", None),  # a thousand, or one
+        ("Sampling rate: 500 Hz, decimated by 2", None),
+        ("Sampling interval: 2", None),
+        ("Sampling rate: 500 rpm", None),
+        ("Sampling rate: 0 Hz", None),
+        ("Sampling rate:", None),
+        ("Sample Rate,500,100", None),
+        ("Sampling rate: 500 Hz\nSampling rate: 100 Hz", None),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:.*is not read as names:tvident.recordings.FileWarning")
+def test_a_sample_rate_that_lines_above_the_numbers_state_is_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: str, rate: float | None
+) -> None:
+    """It was not looked at: who read the file was told to give one."""
+    monkeypatch.chdir(tmp_path)
+    mark = "" if line.startswith("#") else "# "
+    lines = "\n".join(mark + one for one in line.split("\n"))
+    Path("x.csv").write_text(f"{lines}\nangle [rad],torque [N m]\n1,2\n2,0\n1,1\n", encoding="utf-8")
+    recording = tvident.read_recording("x.csv")
+    asked = CliRunner().invoke(main, ["identify", "x.csv", "--angle", "angle", "--torque", "torque"])
+    assert asked.exit_code == 2
+    if rate is None:
+        with pytest.raises(ValueError, match="a sample rate needs a channel of times"):
+            _ = recording.sample_rate
+        assert "it may be" not in asked.stderr
+        return
+    assert recording.sample_rate == pytest.approx(rate)
+    assert f"it may be --sample-rate {rate:g}, as the file says: '" in asked.stderr
+    listed = CliRunner().invoke(main, ["info", "x.csv"])
+    assert f"no channel holds times; it may be --sample-rate {rate:g}" in listed.stdout
+
+
+def test_times_are_believed_rather_than_what_stands_above_them(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text("Sampling rate: 500 Hz\ntime [s];angle [rad]\n0;1\n0.004;2\n0.008;1\n")
+    assert tvident.read_recording(path).sample_rate == pytest.approx(250.0)
+    assert "no channel holds times" not in CliRunner().invoke(main, ["info", str(path)]).stdout

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import recordings
-from tvident._files import full_name, increasing_times, listed, printable, time_channels
+from tvident._files import full_name, increasing_times, listed, printable, stated_rate, time_channels
 from tvident._units import Channel, UnitError, factor_between, named_unit
 
 _RATES = {"fs", "fsamp", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency"}
@@ -75,12 +75,12 @@ def times_of(channels: recordings.Channels, name: str | None, beside: str, file:
         return channel_of(channels, f"{group}{name}", file)
 
 
-def check_has_times(who: str, given: bool, channels: recordings.Channels) -> None:  # noqa: FBT001 - said by its name
-    """Refuse to begin without a sample period, and name the channel that may hold the times."""
+def check_has_times(who: str, given: bool, channels: recordings.Channels, file: str | None) -> None:  # noqa: FBT001 - said by its name
+    """Refuse to begin without a sample period, and name the channel that may hold the times, or what the file states."""
     if given:
         return
     found = time_channels(channels) or [named_unit(name)[0] for name in increasing_times(channels)]
-    known = f"; it may be --time {shlex.quote(printable(found[0]))}" if found else _rate_in(channels)
+    known = f"; it may be --time {shlex.quote(printable(found[0]))}" if found else _rate_in(channels) or stated_in(file)
     raise click.UsageError(f"{who} the sample period; got none; give --sample-rate, --delta or --time{known}")
 
 
@@ -98,6 +98,12 @@ def _rate_in(channels: recordings.Channels) -> str:
         if 0 < rate < np.inf:
             return f"; it may be --sample-rate {rate:.10g}, as {printable(name)} says"
     return ""
+
+
+def stated_in(file: str | None) -> str:
+    """Return what to type where a line above the numbers of a text states the sample rate; nothing elsewhere."""
+    stated = None if file in {None, "-"} else stated_rate(Path(str(file)))
+    return "" if stated is None else f"; it may be --sample-rate {stated.rate:.10g}, as the file says: '{stated.words}'"
 
 
 def channels_in(file: str | None) -> recordings.Channels:

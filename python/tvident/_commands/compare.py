@@ -57,7 +57,7 @@ def compare(
         {RECORDING: file, "the angle": angle, "the torque": torque, "the mask": mask},
     )
     channels = channels_in(file)
-    check_has_times("compare needs", check_time(options["sample_rate"], options["delta"], time_channel), channels)
+    check_has_times("compare needs", check_time(options["sample_rate"], options["delta"], time_channel), channels, file)
     common: dict[str, Any] = {
         name: parameter_of(value, channels, file) if name in COEFFICIENTS else value
         for name, value in given(options).items()

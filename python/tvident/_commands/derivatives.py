@@ -37,7 +37,7 @@ def derivatives(
     channels = channels_in(file)
     if channel is None:
         channel = only_channel(channels, time_channel, file)
-    check_has_times("derivatives need", check_time(sample_rate, delta, time_channel), channels)
+    check_has_times("derivatives need", check_time(sample_rate, delta, time_channel), channels, file)
     samples = channel_of(channels, channel, file)
     times = None if time_channel is None else times_in_seconds(channel_of(channels, time_channel, file))
     fit = tvident.fit_local_polynomials(

@@ -67,7 +67,7 @@ def identified(
 ) -> tvident.Identification:
     """Return what is identified from the channels of a file with these options."""
     is_given = check_time(options["sample_rate"], options["delta"], time_channel)
-    check_has_times("an identification needs", is_given, channels)
+    check_has_times("an identification needs", is_given, channels, file)
     of_method = {name: value for name, value in given(options).items() if name in NAMES}
     turn = None if period is None else scaled(np.asarray(period_of(period)), angle_scale, channels, file)
     motion = {"angle": angle, "velocity": velocity, "acceleration": acceleration}

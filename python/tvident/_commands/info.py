@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from tvident._clocks import grid_of
 from tvident._commands import plain
-from tvident._commands.channels import channels_in
-from tvident._files import aligned, printable
+from tvident._commands.channels import channels_in, stated_in
+from tvident._files import aligned, increasing_times, printable, time_channels
 from tvident._units import ROTARY, named_unit, unit_of, unit_said
 
 
@@ -31,6 +31,9 @@ def info(file: str, as_json: bool) -> None:  # noqa: FBT001 - click passes optio
         counts = str(found["samples"]), *shown, str(found["missing"])
         rows.append((printable(name, 60), found["type"], *counts, found["remark"]))
     click.echo("\n".join(aligned(rows)))
+    stated = "" if time_channels(channels) or increasing_times(channels) else stated_in(file)
+    if stated:
+        click.echo(f"no channel holds times{stated}")
 
 
 def _numbers(name: str, recorded: npt.NDArray[Any]) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from tvident._files.recordings import read
 from tvident._files.replacement import put_in_place, replaced
 from tvident._files.results import ENDINGS as RESULT_ENDINGS
 from tvident._files.results import read_result, write_result
+from tvident._files.stated import stated_rate
 from tvident._files.table import aligned, write_csv, write_table
 from tvident._files.text import copy_text
 from tvident._files.unpacked import ending_of
@@ -41,6 +42,7 @@ __all__ = [
     "read_result",
     "replaced",
     "settings_beside",
+    "stated_rate",
     "time_channels",
     "write_csv",
     "write_result",

@@ -15,6 +15,7 @@ from tvident import _arguments as arguments
 from tvident._files.channels import Channels, full_name
 from tvident._files.names import listed, printable
 from tvident._files.recordings import read
+from tvident._files.stated import stated_rate
 from tvident._files.table import write_table
 from tvident._units import (
     ROTARY,
@@ -354,4 +355,7 @@ def read_recording(path: str | Path) -> FileRecording:
     >>> result = tvident.identify(recording["angle"], recording["torque"], sample_rate=recording.sample_rate)
     """
     path = arguments.path_of("path", path)
-    return FileRecording(read(path), source=printable(path.name))
+    channels = read(path)
+    stated = stated_rate(path) if not time_channels(channels) and not increasing_times(channels) else None
+    rate = None if stated is None else stated.rate
+    return FileRecording(channels, sample_rate=rate, source=printable(path.name))

@@ -27,6 +27,9 @@ _HEAD, _PIECE = 1 << 20, 1 << 22
 
 _LONGEST_LINE = 1_000_000
 
+_ABOVE = 1 << 14
+"""Characters in which what stands above the numbers is looked for."""
+
 _START, _MOSTLY = 4096, 0.3
 """Bytes that show the alphabet of a text, and the part of its letters that are digits and other letters of one byte."""
 
@@ -58,6 +61,11 @@ def read_text(path: Path, say: Say) -> Channels:
 def read_whole(path: Path) -> str:
     """Return a text of which all must be known before it can be read."""
     return _decoded(path, lambda file: file.read())
+
+
+def read_start(path: Path) -> str:
+    """Return what a text begins with: the lines above its numbers are in it."""
+    return _decoded(path, lambda file: file.read(_ABOVE))
 
 
 def _decoded(path: Path, read: Callable[[TextIO], Content]) -> Content:

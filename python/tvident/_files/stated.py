@@ -1,0 +1,96 @@
+"""What a text states of its sample rate in the lines above its numbers."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from tvident._files.cells import decimal_sign, number
+from tvident._files.channels import FileError
+from tvident._files.names import printable
+from tvident._files.text import read_start
+from tvident._files.unpacked import ending_of
+from tvident._units import UnitError, factor_between
+
+_TEXTS = {".csv", ".txt", ".tsv", ".dat", ".asc"}
+
+_SEARCHED = 100
+"""Lines that are looked at."""
+
+_RATE = re.compile(
+    r"\W*(?:(?:sampl(?:e|ing)|acquisition|scan|logging)[ _.-]?(?:rate|freq(?:uency|\.)?)|fs|abtast(?:rate|frequenz)|mess(?:rate|frequenz)"
+    r"|fr[ée]quence d['\u2019](?:[ée]chantillonnage|acquisition)|frecuencia de muestreo|frequenza di campionamento)\b",
+    re.IGNORECASE,
+)
+_PERIOD = re.compile(
+    r"\W*(?:(?:sampl(?:e|ing)|scan|logging)[ _.-]?(?:interval|period)|abtast(?:intervall|periode|zeit)|dt|delta[ _]?t"
+    r"|p[ée]riode d['\u2019][ée]chantillonnage|per[ií]odo de muestreo|periodo di campionamento)\b",
+    re.IGNORECASE,
+)
+_BEHIND_NAME = re.compile(r"(?:[\[(][^\])]*[\])])?\s*,")
+_A_SECOND = re.compile(r"(k?)(?:sa?|samples?|scans?)(?:/s|/sec|ps)", re.IGNORECASE)
+"""Units that count samples in a second, as kS/s."""
+
+
+@dataclass(frozen=True)
+class StatedRate:
+    """Samples per second that a file states, and the words in which it does."""
+
+    rate: float
+    words: str
+
+
+def stated_rate(path: Path) -> StatedRate | None:
+    """Return the sample rate that lines above the numbers of a text state; None where none does, or several differ."""
+    if ending_of(path).lower().removesuffix(".gz") not in _TEXTS:
+        return None
+    try:
+        lines = read_start(path).split("\n")[:_SEARCHED]
+    except (OSError, FileError, UnicodeError):
+        return None
+    return _stated_in(lines)
+
+
+def _stated_in(lines: Iterable[str]) -> StatedRate | None:
+    found = [
+        StatedRate(rate, printable(line.strip(" \t\r,;"), 60)) for line in lines if (rate := _rate_in(line)) is not None
+    ]
+    return found[0] if len({one.rate for one in found}) == 1 else None
+
+
+def _rate_in(line: str) -> float | None:
+    """Return the samples per second of a line that states them, or seconds per sample, and nothing else."""
+    for pattern, is_rate in ((_RATE, True), (_PERIOD, False)):
+        said = pattern.match(line)
+        if said is None:
+            continue
+        rest = line[said.end() :].strip()
+        # A comma behind the name separates cells, as further ones then do; others may be decimal signs.
+        between = r"[\s:;=\",]+" if _BEHIND_NAME.match(rest) else r"[\s:;=\"]+"
+        cells = [one.strip("[](){}") for one in re.split(between, rest)]
+        numbers = {cell: number(cell, comma=True) for cell in cells if cell[:1].isdigit()}
+        units = {cell for cell in cells if cell and cell not in numbers}
+        values = set(numbers.values())
+        value = values.pop() if len(values) == 1 else None
+        if value is None or not value > 0 or any(decimal_sign(cell) == "?" for cell in numbers) or len(units) > 1:
+            return None
+        return _per_second(value, next(iter(units), ""), is_rate=is_rate)
+    return None
+
+
+def _per_second(value: float, unit: str, *, is_rate: bool) -> float | None:
+    """Return a rate, or one over a period, in samples per second; None where the unit is another, or a period has none."""
+    counted = _A_SECOND.fullmatch(unit)
+    if is_rate and counted is not None:
+        return value * (1e3 if counted[1] else 1.0)
+    if not is_rate and not unit:
+        return None
+    try:
+        scaled = value * factor_between(unit, "Hz" if is_rate else "s", name="the rate")
+    except UnitError:
+        return None
+    rate = scaled if is_rate else 1 / scaled
+    return rate if math.isfinite(rate) else None
