@@ -70,6 +70,25 @@ def test_an_attribute_that_arithmetic_kept_converts_nothing() -> None:
     assert_same(tvident.identify(plain, RIG.torque, sample_rate=1000))
 
 
+def test_times_that_were_computed_from_labels_are_not_converted_again() -> None:
+    """Arithmetic of xarray keeps `units`, so `angle.time / 1000` was divided by 1000 twice: 1 MHz, *I* a millionth, without a word."""
+    labels = {"time": ("time", 1e3 * RIG.time, {"units": "ms"})}
+    angle, torque = (xarray.DataArray(one, dims="time", coords=labels) for one in (RIG.angle, RIG.torque))
+    assert_same(tvident.identify(angle, torque, t=angle.time))
+    seconds = (angle.time / 1000).assign_attrs(units="ms")  # as arithmetic of recent versions leaves it
+    for call in (
+        lambda: tvident.identify(angle, torque, t=seconds),
+        lambda: tvident.fit_local_polynomials(angle, 51, t=seconds),
+    ):
+        with pytest.raises(ValueError, match=r"an attribute says 'ms'.*or time_unit='s' if they were converted"):
+            call()
+    assert_same(tvident.identify(angle, torque, t=seconds, time_unit="s"))
+    assert_same(tvident.identify(angle, torque, t=seconds.to_numpy()))
+    with pytest.raises(ValueError, match="must be that of the times that the samples are labelled with; got 1 s"):
+        tvident.identify(angle, torque, t=angle.time.to_numpy())
+    assert_same(tvident.identify(angle, torque, t=angle.time.to_numpy(), time_unit="ms"))
+
+
 def test_a_position_and_a_force_are_a_linear_axis(tmp_path: Path) -> None:
     found = tvident.identify(1e3 * RIG.angle, RIG.torque, sample_rate=1000, angle_unit="mm", torque_unit="N")
     assert_same(found)

@@ -354,7 +354,7 @@ def sampled(
     if time["delta"] is not None and axis.time != 1:
         time["delta"] = arguments.positive_number("delta", time["delta"]) * axis.time
     period = arguments.sample_period(samples, **time)
-    if time["t"] is None:
+    if time_unit is None or time["t"] is None:
         arguments.check_against_labels(channel, period)
     return period, time["t"]
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from tvident._units.channel import has_unit_in_attributes, in_its_unit, unit_named, unit_said
+from tvident._units.channel import has_unit_in_attributes, in_its_unit, is_computed_label, unit_named, unit_said
 from tvident._units.quantities import LINEAR, ROTARY, System, UnitError, factor_to, is_convertible, system_of
 
 # What has no place to say a unit: the only ones that come a thousand times a second.
@@ -70,8 +70,9 @@ def axis_of(
         if units[name]:
             _check_named(system, name, units[name])
     for name, unit in given.items():
-        # Coordinates of time say their unit in no other way, and hardly anybody computes with them.
-        if name != "time" and not unit and has_unit_in_attributes(values[name]):
+        # Coordinates of time say their unit in no other way.
+        is_doubtful = has_unit_in_attributes(values[name]) if name != "time" else is_computed_label(values[name])
+        if not unit and is_doubtful:
             _check_named(system, name, units[name], by="an attribute", what="arithmetic keeps attributes")
     factors = {name: factor_to(system, name, unit, name=f"the {name}") for name, unit in units.items()}
     return Axis(system, **factors, assumed=frozenset(name for name, unit in units.items() if not unit))
@@ -119,8 +120,12 @@ def times_in_seconds(t: Any, time_unit: str | None = None) -> Any:
     unit = time_unit or unit_said(t)
     if not unit and getattr(getattr(t, "dtype", None), "kind", "") not in {"m", "M"}:
         _check_named(ROTARY, "time", unit_named(t))
+    if not time_unit and is_computed_label(t):
+        _check_named(ROTARY, "time", unit, by="an attribute", what="arithmetic keeps attributes")
     factor = factor_to(ROTARY, "time", unit, name="the time")
-    return t if factor == 1 else scaled(np.asarray(in_its_unit(t)), factor)
+    # What says another unit than the one that was given would be converted by whoever takes it next.
+    is_plain = factor == 1 and (time_unit is None or not unit_said(t))
+    return t if is_plain else scaled(np.asarray(in_its_unit(t)), factor)
 
 
 def scaled(array: npt.NDArray[Any], factor: float) -> npt.NDArray[Any]:

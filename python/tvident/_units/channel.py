@@ -169,6 +169,15 @@ def has_unit_in_attributes(values: Any) -> bool:
     return computes and not isinstance(values, np.ndarray) and bool(_in_attributes(values))
 
 
+def is_computed_label(values: Any) -> bool:
+    """Return whether values of xarray are called as a coordinate of theirs and are other numbers: they were computed from it."""
+    coordinates, name = getattr(values, "coords", None), getattr(values, "name", None)
+    if not isinstance(coordinates, Mapping) or name not in coordinates or getattr(values, "chunks", None):
+        return False
+    label = np.asarray(coordinates[name])
+    return label.shape == np.shape(values) and not np.array_equal(label, np.asarray(values))
+
+
 def _in_attributes(values: Any) -> str:
     attributes = getattr(values, "attrs", None)
     if not isinstance(attributes, Mapping):
