@@ -268,6 +268,15 @@ def test_nothing_is_lost_and_what_is_dropped_is_said(
         ("t,x\n0,1\n12:00:00,2\n", "line 3 must hold numbers; it has '12:00:00'"),
         ("t,x,y\n" + "0,1,\n" * 25 + "0,1,2\n0,1,bad\n", "line 28 must hold numbers; it has 'bad' in column 'y'"),
         ("t;x\n0;1,234\n1;1.234\n", "a comma in line 2 may be a decimal sign"),
+        ("t,x\n" + "1.234,2.345\n" * 4 + '1.5,"1,5"\n', "numbers must have one decimal sign"),
+        (
+            "t,x\n" + "1.234,2.345\n" * 4 + '1.235,"1,5"\n',
+            r"the '\.' in line 2 may be a decimal sign or separate thousands, as in 9",
+        ),
+        (
+            "t;x\n" + "1,234;2,345\n" * 4 + "1,235;1.5\n",
+            "the ',' in line 2 may be a decimal sign or separate thousands, as in 9",
+        ),
         ("t;x\n0;1.234,5\n1;2.5\n", "one decimal sign; line 2 has a comma and line 3 a point"),
     ],
 )

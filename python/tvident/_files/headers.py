@@ -327,3 +327,11 @@ def not_a_number(place: int, name: str | None, cell: str) -> str:
         f"line {place} must hold numbers; it has '{printable(cell, 40)}'{column}; write 1234.5 without separators of "
         f"thousands, leave the cell empty where a value is missing, and begin comments with #"
     )
+
+
+def not_a_time(place: int, name: str, cell: str) -> str:
+    """Return the message about a cell of a column of times."""
+    return (
+        f"line {place} must hold a time in column '{printable(name, 40)}', as the lines above; it has '{printable(cell, 40)}'; write "
+        f"12:30:00.5 or 2024-12-31T12:30:00.5"
+    )

@@ -26,7 +26,7 @@ from tvident._files.cells import (
 from tvident._files.channels import FileError, Say
 from tvident._files.cut import what_lacks
 from tvident._files.dialect import Dialect
-from tvident._files.headers import CURE, not_a_number
+from tvident._files.headers import CURE, not_a_number, not_a_time
 from tvident._files.names import printable
 from tvident._files.times import TimeColumn, instant
 
@@ -37,6 +37,9 @@ _CLEARLY_DECIMAL = re.compile(r"(?<!\d)0,\d|\d{4},\d|,\d{1,2}(?!\d)|,\d{4}")
 
 _CLEARLY_POINTS = re.compile(r"(?<!\d)0?\.\d|\d{4}\.|\.\d{0,2}(?!\d)|\.\d{4}")
 """The same for points, which separate thousands where semicolons separate cells and no number has a comma."""
+
+_MOST_DOUBTFUL = 3
+"""Numbers in which a sign may separate thousands, for each one whose decimal sign is the other: an odd cell decides nothing."""
 
 _MOST_WORDS = 20
 """Lines of words that may stand below the numbers."""
@@ -84,6 +87,8 @@ class Rows:
         """First line that has a number with this decimal sign."""
         self._doubtful = {".": 0, ",": 0}
         """First line that has a number in which this sign may as well separate thousands."""
+        self._clear_count, self._doubtful_count = 0, 0
+        """Where the decimal sign is known, numbers that have it, and those in which the other sign separates thousands."""
         self._remarks = {column: "" for column, kind in enumerate(dialect.kinds) if kind == "words"}
         """Where columns of words have their first, and the word."""
         self._numbers: set[int] = set()
@@ -156,6 +161,8 @@ class Rows:
         """Check what only the whole text shows, and say what was not read."""
         if self._dialect.decimal is None:
             self._check_signs()
+        else:
+            self._check_thousands()
         for column, times in self.times.items():
             if times.is_doubtful:
                 raise FileError(
@@ -200,6 +207,8 @@ class Rows:
                 clear = is_clear.search(bare)
                 known, place = (self._doubtful, bare.index(sign)) if clear is None else (self._signs, clear.start())
                 known[sign] = known[sign] or self._line + 1 + bare.count("\n", 0, place)
+        if d.decimal is not None:
+            self._clear_count += bare.count(d.decimal)
         for column, kind in enumerate(d.kinds):
             if kind == "nothing" and np.isfinite(found[:, column]).any():
                 if column in self._remarks:
@@ -394,11 +403,22 @@ class Rows:
         if sign == "?":
             sign = "," if "," in cell else "."
             self._doubtful[sign] = self._doubtful[sign] or place
+            self._doubtful_count += 1
         else:
             self._signs[sign] = self._signs[sign] or place
+            self._clear_count += 1
         if self._signs["."] and self._signs[","]:
             raise FileError(
                 f"numbers must have one decimal sign; line {self._signs[',']} has a comma and line {self._signs['.']} a point; {CURE}"
+            )
+
+    def _check_thousands(self) -> None:
+        """Refuse many numbers in which a sign would separate thousands for the sake of few with the other."""
+        if self._doubtful_count > _MOST_DOUBTFUL * self._clear_count:
+            other, place = next((sign, place) for sign, place in self._doubtful.items() if place)
+            raise FileError(
+                f"the '{other}' in line {place} may be a decimal sign or separate thousands, as in {self._doubtful_count} numbers, and "
+                f"{self._clear_count} with the other sign cannot tell; {CURE}"
             )
 
     def _check_signs(self) -> None:
@@ -414,14 +434,6 @@ class Rows:
             self._say(
                 "every point has three digits behind it; it is read as the decimal sign, not as a separator of thousands"
             )
-
-
-def not_a_time(place: int, name: str, cell: str) -> str:
-    """Return the message about a cell of a column of times."""
-    return (
-        f"line {place} must hold a time in column '{printable(name, 40)}', as the lines above; it has '{printable(cell, 40)}'; write "
-        f"12:30:00.5 or 2024-12-31T12:30:00.5"
-    )
 
 
 def _no_number(_: str) -> float:
