@@ -15,6 +15,7 @@ from tvident._expansion.search import (
     curve_along,
     curves_of,
 )
+from tvident._expansion.steps import variance_of_steps
 
 __all__ = [
     "DERIVATIVES",
@@ -35,4 +36,5 @@ __all__ = [
     "curve_along",
     "curves_of",
     "placed",
+    "variance_of_steps",
 ]

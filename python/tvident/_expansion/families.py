@@ -27,6 +27,10 @@ OPEN_PERIOD = 1.5
 """Period of harmonics over the interval where the curve need not end as it begins: longer ones are harder to tell from each other."""
 
 
+def _no_cells(_: int) -> int:
+    return 0
+
+
 @dataclass(frozen=True)
 class Family:
     """Functions on the interval from 0 to 1, as many as wanted.
@@ -40,12 +44,15 @@ class Family:
         How many derivatives are continuous, of those that equations need.
     block : callable, optional
         Of places and a size: which function is one there, where all others are zero.
+    cells : callable, optional
+        Of a size: in how many parts of one length functions are constant; 0 where they are not.
     """
 
     values: Values
     sizes: Callable[[], Iterator[int]]
     smooth: int = 2
     block: Callable[[Array, int], Blocks] | None = None
+    cells: Callable[[int], int] = _no_cells
 
 
 def every(first: int = 1, step: int = 1) -> Iterator[int]:
@@ -119,6 +126,15 @@ def _block(places: Array, size: int) -> Blocks:
     return np.clip((places * size).astype(np.int64), 0, size - 1)
 
 
+def _as_many(size: int) -> int:
+    return size
+
+
+def _of_haar(size: int) -> int:
+    """Return the parts that the shortest steps divide the interval into."""
+    return 1 << (size - 1).bit_length()
+
+
 FAMILIES: dict[str, Family] = {
     "chebyshev": Family(_chebyshev, every),
     "chebyshev2": Family(_second_chebyshev, every),
@@ -126,8 +142,8 @@ FAMILIES: dict[str, Family] = {
     "powers": Family(_legendre, every),
     "fourier": Family(_fourier, partial(every, 1, 2)),
     "laguerre": Family(_laguerre, every),
-    "block_pulse": Family(_block_pulse, every, smooth=-1, block=_block),
-    "haar": Family(haar_values, _doubled, smooth=-1),
+    "block_pulse": Family(_block_pulse, every, smooth=-1, block=_block, cells=_as_many),
+    "haar": Family(haar_values, _doubled, smooth=-1, cells=_of_haar),
     **{
         f"db{order}": Family(partial(scaling_values, order), partial(every, 2 * order), smooth=0)
         for order in range(2, 6)

@@ -16,6 +16,7 @@ from tvident._expansion.families import Family
 from tvident._expansion.fit import Curves, Fitted, Linearised, ScoredSize
 from tvident._expansion.rivals import Rival, Rivals, weights_of
 from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown, placed
+from tvident._expansion.steps import variance_of_steps
 from tvident._expansion.unseen import Bend, Unseen
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -323,6 +324,7 @@ def curve_along(basis: Basis, factors: Array, root: Array, rivals: Rivals) -> tu
         some = slice(first, min(samples, first + AT_A_TIME))
         functions = basis.along(some, 0)
         moved, added = rivals.beside(_functions_at(some))
+        added = added + variance_of_steps(basis, factors, root, [one.places[some] for one in basis.coordinates])
         values[some] = functions @ factors + moved
         errors[some] = np.sqrt(((functions @ root) ** 2).sum(axis=1) + added)
     return values, errors

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from tvident._expansion import Basis, Rivals
+from tvident._expansion import Basis, Rivals, variance_of_steps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -194,6 +194,7 @@ class ExpandedParameter:
         functions, inside, shape = self._at(positions)
         variance = ((functions @ self._own_root) ** 2).sum(axis=1)
         _, added = self._beside(positions)
+        added = added + variance_of_steps(self._functions, self._own, self._own_root, self._places(positions))
         variance = np.maximum(variance, 0) + added
         return np.where(inside, np.sqrt(np.maximum(variance, 0)), np.nan).reshape(shape)
 

@@ -1,0 +1,50 @@
+"""What functions that are constant in cells leave of a curve that changes within these: part of its errors at a place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._expansion.basis import Basis
+
+Array: TypeAlias = npt.NDArray[np.float64]
+
+_OF_A_LINE = 1 / 12
+"""The mean square of what a line leaves around its mean in a cell, over the square of its change there."""
+
+
+def variance_of_steps(basis: Basis, factors: Array, root: Array, places: Sequence[Array]) -> Array | float:
+    """Return the mean square by which a curve leaves its steps around some places: zero for functions without steps.
+
+    Within a cell the curve changes as from one cell to the next: the smaller of both changes where they have one sign, so that a jump
+    between level parts adds nothing, less what noise makes of it.
+    """
+    added: Array | float = 0.0
+    for number, (family, size) in enumerate(zip(basis.families, basis.sizes, strict=True)):
+        cells = family.cells(size)
+        if cells > 1:
+            added = added + _OF_A_LINE * _change(basis, factors, root, places, number, 1 / cells) ** 2
+    return added
+
+
+def _change(basis: Basis, factors: Array, root: Array, places: Sequence[Array], number: int, width: float) -> Array:
+    """Return the change of a curve within the cells of one of its coordinates."""
+    own = basis.at(places)
+    sides = []
+    for shift in (-width, width):
+        moved = places[number] + shift
+        is_inside = (moved >= 0) & (moved <= 1)
+        beside = basis.at([moved.clip(0, 1) if one == number else place for one, place in enumerate(places)])
+        change = np.sign(shift) * ((beside - own) @ factors)
+        noise = (((beside - own) @ root) ** 2).sum(axis=1)
+        sides.append(np.where(is_inside, change, np.nan))
+        sides.append(np.where(is_inside, noise, np.nan))
+    before, _, behind, _ = sides
+    before, behind = (np.where(np.isnan(one), other, one) for one, other in ((before, behind), (behind, before)))
+    smaller = np.where(np.abs(before) < np.abs(behind), before, behind)
+    noise = np.nanmean(sides[1::2], axis=0)
+    square = np.where(before * behind > 0, smaller**2, 0.0) - noise
+    return np.asarray(np.sqrt(np.maximum(square, 0.0)))
