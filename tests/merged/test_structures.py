@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 import pytest
 
 import tvident
@@ -199,3 +200,25 @@ def test_an_entry_of_a_symmetric_matrix_is_its_mirror_image(entry: tuple[int, in
         tvident.Matrix("symmetric", entries={entry: "constant", entry[::-1]: value})
     # Of a full matrix they are two.
     assert len(tvident.Matrix("full", entries={entry: value}).elements("stiffness", 2)) == 4
+
+
+def test_a_base_that_says_its_unit_is_converted() -> None:
+    """It was taken in the unit of the angle: a base in m beside positions in mm was a thousandth of itself."""
+    masses = chain([lambda t: 12 + 0 * t], 3000, seed=8, driven=(0,), base=True)
+    base = np.asarray(masses.base)
+    given: dict[str, Any] = {"sample_rate": 1000, "dof_axis": 0, "angle_unit": "mm", "torque_unit": "N"}
+
+    def found(moving: Any) -> Any:
+        structure = tvident.Chain(1, [("base", 0)], base=moving)
+        return identify(1e3 * masses.angle, masses.torque, structure=structure, **given).constants["stiffness_base_0"]
+
+    plain = found(1e3 * base)
+    assert plain[0] == pytest.approx(12, rel=0.01)
+    assert found(tvident.Channel(base, "m")) == pytest.approx(plain, rel=1e-9)
+    assert found(tvident.Channel(1e3 * base, "mm")) == pytest.approx(plain, rel=1e-9)
+    with pytest.raises(ValueError, match="the base must be in a unit that can be converted to m; got 'V'"):
+        found(tvident.Channel(base, "V"))
+    labelled = pd.Series(base)
+    labelled.attrs["units"] = "m"
+    with pytest.raises(ValueError, match="where only an attribute says 'm'"):
+        found(labelled)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +16,17 @@ from tvident._equation import LINEAR_UNITS, OFFSET, UNITS, Unknown, all_terms
 from tvident._identify.columns import WINDOW_OF_TERMS, Columns
 from tvident._identify.earlier import check_no_own_terms
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, WeakForm, exponent_of
-from tvident._units import ROTARY, Axis, axis_of, times_in_seconds
+from tvident._units import (
+    ROTARY,
+    Axis,
+    UnitError,
+    axis_of,
+    factor_to,
+    has_unit_in_attributes,
+    scaled,
+    times_in_seconds,
+    unit_said,
+)
 
 if TYPE_CHECKING:
     from tvident._merged import Earlier, Masses, MergedIdentification, Sampling, Trials
@@ -190,9 +200,8 @@ def _masses(angle: Any, torque: Any, options: Options, axis: Axis) -> tuple[None
     """Return no trials of one mass, but the masses of every trial, with their weights."""
     from tvident._merged import masses_of, of_core, weights_of_trials  # noqa: PLC0415 - likewise
 
-    found = masses_of(
-        angle, torque, options.dof_axis or 0, options.structure, trials=options.ensemble_axis, mask=options.mask
-    )
+    structure = _in_unit_of_angle(options.structure, axis)
+    found = masses_of(angle, torque, options.dof_axis or 0, structure, trials=options.ensemble_axis, mask=options.mask)
     masses = [one.scaled(axis.angle, axis.torque) for one in found]
     lengths = [one.angles[0].size for one in masses]
     weights = weights_of_trials(options.weights, lengths, several=options.ensemble_axis is not None)
@@ -202,6 +211,24 @@ def _masses(angle: Any, torque: Any, options: Options, axis: Axis) -> tuple[None
         return None, masses
     of_rows = of_core(weights) or [None] * len(weights)
     return None, [one.weighted(own, rows) for one, own, rows in zip(masses, weights, of_rows, strict=True)]
+
+
+def _in_unit_of_angle(structure: Any, axis: Axis) -> Any:
+    """Return a chain whose base says a unit of its own with a base in that of the angle, in which it is taken."""
+    base = getattr(structure, "base", None)
+    unit = "" if base is None else unit_said(base)
+    if not unit:
+        return structure
+    factor = factor_to(axis.system, "angle", unit, name="the base") / axis.angle
+    if factor == 1:
+        return structure
+    if has_unit_in_attributes(base):
+        raise UnitError(
+            f"the base must be in the unit of the angle where only an attribute says {unit!r}: arithmetic keeps attributes, so nobody "
+            f"knows whether the numbers still are; pass tvident.Channel(base, {unit!r}), or .to_numpy() if they were converted"
+        )
+    each = [scaled(np.asarray(one), factor) for one in base] if isinstance(base, list | tuple) else None
+    return replace(structure, base=scaled(np.asarray(base), factor) if each is None else each)
 
 
 def _check_nan(channels: Mapping[str, Sequence[Numbers]], weights: Numbers | None, options: Options) -> None:

@@ -35,8 +35,8 @@ class Chain:
     dampers : sequence of (int or "base", int or "base"), optional
         What every damper connects; by default a damper lies beside each spring.
     base : array_like, shape (n,), optional
-        Motion of the base, in the unit of the angle: a road, a motor's shaft. By default it does not move. Of several trials one row or
-        array for each.
+        Motion of the base, in the unit of the angle unless it says its own (:class:`Channel`): a road, a motor's shaft. By default it
+        does not move. Of several trials one row or array for each.
 
     Raises
     ------
