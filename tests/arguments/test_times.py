@@ -31,6 +31,21 @@ def test_few_digits_give_the_rate_that_was_set(of: float, digits: int, cut: Any)
     assert rate((cut(COUNT / of, digits)).astype(np.float32)) == pytest.approx(of, rel=1e-4)
 
 
+def printed(t: Any, significant: int) -> Any:
+    return np.array([float(f"{one:.{significant}g}") for one in t])
+
+
+@pytest.mark.parametrize(("of", "digits", "count"), [(1024, 6, 15000), (512, 6, 7000), (333, 6, 9000)])
+def test_so_many_digits_from_the_first_on_are_few_at_the_end(of: int, digits: int, count: int) -> None:
+    """Times as ``%.6g`` prints them were taken for stamps that jitter: their first have more digits behind the point."""
+    t = np.arange(count) / of
+    assert rate(printed(t, digits)) == pytest.approx(of, rel=1e-7)
+    moved = t + np.random.default_rng(1).uniform(-0.2, 0.2, count) / of
+    for other in (moved, np.r_[t[:4000], t[4000:] + 1 / of]):
+        with pytest.raises(ValueError, match="t must be uniform"):
+            rate(printed(np.sort(np.abs(other)), digits))
+
+
 @given(of=st.integers(50, 900), digits=st.just(3), lost=st.integers(300, 2700))
 def test_a_lost_sample_is_never_taken_for_rounding(of: int, digits: int, lost: int) -> None:
     t = np.round(np.where(lost > COUNT, COUNT, COUNT + 1) / of, digits)

@@ -63,3 +63,11 @@ def test_derivatives_are_at_the_samples_own_times(jittered: Path, tmp_path: Path
     np.testing.assert_allclose(columns["time"], tvident.read_recording(jittered)["time"], rtol=1e-12)
     velocity = np.interp(columns["time"], RIG.time, RIG.true_velocity)
     assert np.std(columns["derivative_1"][100:-100] - velocity[100:-100]) < 0.02 * velocity.std()
+
+
+def test_times_with_few_digits_are_listed_as_they_are_taken(tmp_path: Path) -> None:
+    """Of 800 Hz with three digits `info` listed 1000 Hz and 1500 samples lost."""
+    path = tmp_path / "x.csv"
+    t = np.arange(6000) / 800
+    np.savetxt(path, np.column_stack([t, np.sin(t)]), header="time [s],angle", comments="", fmt="%.3f", delimiter=",")
+    assert "uniform within its digits: 800 per unit, 800 Hz" in run("info", path)

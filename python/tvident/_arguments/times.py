@@ -27,6 +27,9 @@ _JITTER = 1e-3
 _FEW_TIMES = 100
 """Times of which a step is asked first: they deny most steps."""
 
+_FINE = 0.25
+"""Of a period: the largest step of times whose digits behind the point differ."""
+
 _DIGITS = 9
 """Digits behind the point that printed times may have: nanoseconds."""
 
@@ -187,8 +190,7 @@ def period_of_times(t: npt.ArrayLike, samples: int) -> float:
         return period
     kind = given.dtype if given.dtype.kind == "f" else np.dtype(np.float64)
     slack = float(np.spacing(np.abs(seconds).max().astype(kind)))
-    quantum = _quantum(seconds, slack)
-    bounds = None if quantum is None else _periods(seconds, period, (1 + _SEARCHED) * quantum + 4 * slack)
+    quantum, bounds = _printed(seconds, period, slack)
     # Times that most samples share may be of any rate.
     if quantum is None or bounds is None or not bounds[0] > 0:
         raise _not_uniform(seconds, distance, period)
@@ -274,6 +276,22 @@ def _quantum(seconds: Seconds, slack: float) -> float | None:
         if all(_off(part * 10.0**digits) <= bound for part in parts):
             return 10.0**-digits
     return None
+
+
+def _printed(seconds: Seconds, period: float, slack: float) -> tuple[float | None, tuple[float, float] | None]:
+    """Return the decimal step that times were printed in, and the shortest and the longest period that they may have."""
+    quantum = _quantum(seconds, slack)
+    bounds = None if quantum is None else _periods(seconds, period, (1 + _SEARCHED) * quantum + 4 * slack)
+    if bounds is not None:
+        return quantum, bounds
+    # Printed with so many digits from the first on, as %.6g does, the largest have the fewest behind the point.
+    size = np.abs(seconds)
+    last = seconds[size >= 10.0 ** np.floor(np.log10(size.max()))]
+    coarse = _quantum(last, slack) if last.size >= _FEW_TIMES else None
+    # A coarser one might hide that a sample is lost where times are small.
+    if coarse is None or coarse > _FINE * period:
+        return quantum, None
+    return coarse, _periods(seconds, period, (1 + _SEARCHED) * coarse + 4 * slack)
 
 
 def _off(scaled: Seconds) -> float:

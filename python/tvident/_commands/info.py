@@ -8,6 +8,7 @@ import click
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _arguments as arguments
 from tvident._clocks import grid_of
 from tvident._commands import plain
 from tvident._commands.channels import channels_in, stated_in
@@ -85,6 +86,13 @@ def _steps(name: str, times: npt.NDArray[np.float64]) -> str:
         grid = grid_of(times)
     except ValueError:
         return "increasing, mostly gaps"
+    if grid.samples > times.size:
+        try:
+            period = arguments.sample_period(times.size, t=times)
+        except ValueError:
+            pass
+        else:  # of few digits
+            return f"uniform within its digits: {1 / period:.6g} per unit{_in_hertz(name, period)}"
     gaps = int(np.count_nonzero(np.diff(grid.places) > grid.bridged))
     words = f"increasing: {1 / grid.period:.6g} per unit{_in_hertz(name, grid.period)}"
     if grid.jitter:
