@@ -135,3 +135,9 @@ def test_few_samples_of_a_fast_clock_are_simulated() -> None:
     r = tvident.simulate_torsional_rig(1e-6, sample_rate=1e9)
     assert r.angle.shape == (1000,)
     assert np.isfinite(r.torque).all()
+
+
+def test_the_truth_is_found_by_name() -> None:
+    rig = tvident.simulate_torsional_rig(duration=1.0)
+    assert list(rig.truth) == ["inertia", "damping", "stiffness"]
+    assert all(value is getattr(rig, name) for name, value in rig.truth.items())

@@ -62,6 +62,16 @@ class Recording:
     true_torque: Array
     sample_rate: float
 
+    @property
+    def truth(self) -> dict[str, Array]:
+        """The true parameters by name, arrays of shape (n,): ``"inertia"``, ``"damping"``, ``"stiffness"``.
+
+        See Also
+        --------
+        tvident.identify : estimates them.
+        """
+        return {name: getattr(self, name) for name in ("inertia", "damping", "stiffness")}
+
     def save(self, path: str | Path) -> None:
         """Write time, angle, torque, slider position and truth to a CSV or NPZ file, with units in the header.
 
