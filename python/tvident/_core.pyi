@@ -47,7 +47,7 @@ from tvident._core_stubs.noise import (
     spike_counts,
     unread_counts,
 )
-from tvident._core_stubs.regression import RollingRegressions, rolling_least_squares, rows_within
+from tvident._core_stubs.regression import RollingRegressions, RowSpans, RowTimes, rolling_least_squares
 from tvident._core_stubs.response import Modes, Responses, modes, respond
 from tvident._core_stubs.streams import (
     ParameterStream,
@@ -98,6 +98,8 @@ __all__ = [
     "Responses",
     "RollingRegressions",
     "RollingStream",
+    "RowSpans",
+    "RowTimes",
     "Scan",
     "StreamedEstimates",
     "StreamedParameters",
@@ -125,7 +127,6 @@ __all__ = [
     "quantisation_step",
     "respond",
     "rolling_least_squares",
-    "rows_within",
     "sliding_velocity",
     "spike_counts",
     "status_flags",

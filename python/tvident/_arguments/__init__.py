@@ -24,6 +24,7 @@ from tvident._arguments.shown import nearest, shown
 from tvident._arguments.times import (
     NotUniformError,
     begin_of,
+    certainly_irregular,
     check_against_labels,
     clock_changed,
     implied_times,
@@ -46,6 +47,7 @@ __all__ = [
     "any_array",
     "as_record",
     "begin_of",
+    "certainly_irregular",
     "channel",
     "channels",
     "check_against_labels",

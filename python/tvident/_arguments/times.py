@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _core
 from tvident._arguments.arrays import real_array
 from tvident._arguments.containers import package_of, plain
 from tvident._units import ROTARY, is_convertible, times_in_seconds, unit_said
@@ -23,6 +24,9 @@ _LONGEST = 1e30
 
 # How far a time stamp may lie from a uniform grid, as a fraction of the sample period.
 _JITTER = 1e-3
+
+_ROUNDING = 4 * float(np.finfo(np.float64).eps)
+"""How much a double may be rounded on its way, as a part of the largest."""
 
 _FEW_TIMES = 100
 """Times of which a step is asked first: they deny most steps."""
@@ -260,12 +264,38 @@ def clock_changed(step: float) -> str:
 
 def printed_step(seconds: Seconds) -> float:
     """Return the decimal step that times were printed in, 0 where they have too many digits for one."""
-    return _quantum(seconds, float(np.spacing(np.abs(seconds).max()))) or 0.0
-
-
-def _quantum(seconds: Seconds, slack: float) -> float | None:
-    """Return the decimal step that all times are multiples of, but for rounding; None where they have too many digits for one."""
     largest = float(np.abs(seconds).max())
+    return _quantum(seconds, float(np.spacing(largest)), largest) or 0.0
+
+
+def certainly_irregular(seconds: Seconds, seen: _core.RowTimes) -> bool:
+    """Tell whether `period_of_times` would find increasing times not uniform, where one look at them shows it.
+
+    Parameters
+    ----------
+    seconds : ndarray, shape (n,)
+        The times.
+    seen : RowTimes
+        The same, as the core saw them.
+    """
+    largest = seen.largest()
+    if seconds.size < 3 or not seen.increase() or not largest < _COUNTABLE * _LONGEST:  # noqa: PLR2004 - one step is uniform
+        return False
+    allowed = max(_JITTER * seen.length() / (seconds.size - 1), _ROUNDING * largest)
+    # Twice what is allowed: here distances are rounded in another way.
+    if not seen.farthest() > 2 * allowed:
+        return False
+    # The largest may be printed with fewer digits behind the point than the others.
+    last = seconds[-_FEW_TIMES:] if abs(seconds[-1]) >= abs(seconds[0]) else seconds[:_FEW_TIMES]
+    slack = float(np.spacing(largest))
+    return all(_quantum(some, slack, largest) is None for some in (last, seconds))
+
+
+def _quantum(seconds: Seconds, slack: float, largest: float) -> float | None:
+    """Return the decimal step that all times are multiples of, but for rounding; None where they have too many digits for one.
+
+    The largest magnitude of the times is given.
+    """
     # Most times are none of most steps, as few of them show.
     parts = (seconds[:_FEW_TIMES], seconds)
     for digits in range(_DIGITS + 1):
@@ -280,14 +310,15 @@ def _quantum(seconds: Seconds, slack: float) -> float | None:
 
 def _printed(seconds: Seconds, period: float, slack: float) -> tuple[float | None, tuple[float, float] | None]:
     """Return the decimal step that times were printed in, and the shortest and the longest period that they may have."""
-    quantum = _quantum(seconds, slack)
+    largest = float(np.abs(seconds).max())
+    quantum = _quantum(seconds, slack, largest)
     bounds = None if quantum is None else _periods(seconds, period, (1 + _SEARCHED) * quantum + 4 * slack)
     if bounds is not None:
         return quantum, bounds
     # Printed with so many digits from the first on, as %.6g does, the largest have the fewest behind the point.
     size = np.abs(seconds)
-    last = seconds[size >= 10.0 ** np.floor(np.log10(size.max()))]
-    coarse = _quantum(last, slack) if last.size >= _FEW_TIMES else None
+    last = seconds[size >= 10.0 ** np.floor(np.log10(largest))]
+    coarse = _quantum(last, slack, largest) if last.size >= _FEW_TIMES else None
     # A coarser one might hide that a sample is lost where times are small.
     if coarse is None or coarse > _FINE * period:
         return quantum, None

@@ -22,28 +22,30 @@ _SAME = 1e-9
 
 @dataclass(frozen=True)
 class Spans:
-    """Rows of the window of every row.
+    """The windows of all rows.
 
     Parameters
     ----------
-    first, end : ndarray, shape (n,)
-        The first row, and the one after the last.
-    flags : ndarray of uint16, shape (n,)
-        EDGE where a window reaches beyond the record, INVALID where less than half of it lies within.
+    rows : RowSpans
+        Which rows they hold.
+    near, flags : ndarray
+        Windows that reach beyond the record. EDGE where less than its duration lies within, INVALID where less than half does.
+    at_least : int or None
+        How many rows they must hold.
     """
 
-    first: npt.NDArray[np.uintp]
-    end: npt.NDArray[np.uintp]
+    rows: _core.RowSpans
+    near: npt.NDArray[np.uintp]
     flags: npt.NDArray[np.uint16]
     at_least: int | None
 
     @property
-    def count(self) -> npt.NDArray[np.uintp]:
-        """How many rows each window holds."""
-        return self.end - self.first
+    def most(self) -> int:
+        """Rows in the fullest window."""
+        return self.rows.most_and_fewest()[0]
 
 
-def irregular_times(asked: AskedWindows, rows: int) -> Array | None:
+def irregular_times(asked: AskedWindows, rows: int) -> _core.RowTimes | None:
     """Return times in seconds where a duration was asked for on times that are not uniform; None otherwise.
 
     Raises
@@ -53,6 +55,13 @@ def irregular_times(asked: AskedWindows, rows: int) -> Array | None:
     """
     if asked.t is None or not isinstance(asked.window_length, str):
         return None
+    is_alone = asked.delta is None and asked.sample_rate is None
+    if is_alone and isinstance(asked.t, np.ndarray) and asked.t.dtype == np.float64 and asked.t.shape == (rows,):
+        # Most times tell at once.
+        plain: Array = np.asarray(asked.t)
+        seen = _core.RowTimes(plain)
+        if arguments.certainly_irregular(plain, seen):
+            return seen
     try:
         asked.period(rows)
     except ValueError:
@@ -66,35 +75,34 @@ def irregular_times(asked: AskedWindows, rows: int) -> Array | None:
                 f"t must increase from row to row; t[{place}] is {times[place]:.9g} after {times[place - 1]:.9g}; sort the rows by time, "
                 "and keep one of each time"
             ) from None
-        # From the first row on: seconds since 1970 have no digits left for what a border is told by.
-        since: Array = times - times[0]
-        return since
+        seen = _core.RowTimes(times)
+        if not seen.increase():
+            raise
+        return seen
     return None
 
 
-def spans_given(asked: AskedWindows, times: Array, regressors: int) -> Spans:
+def spans_given(asked: AskedWindows, times: _core.RowTimes, regressors: int) -> Spans:
     """Return which rows lie in the window of every row."""
-    duration = arguments.seconds("window_length", str(asked.window_length))
+    duration, length = arguments.seconds("window_length", str(asked.window_length)), times.length()
     if asked.half_life is not None:
         raise ValueError(
-            f"half_life must go with uniform times; got {asked.half_life!r} with steps of {np.diff(times).min():.3g} to "
-            f"{np.diff(times).max():.3g} s; resample the rows, or leave it out"
+            f"half_life must go with uniform times; got {asked.half_life!r} with {_steps_of(times)}; resample the rows, or leave it out"
         )
-    if not duration <= times[-1] - times[0]:
+    if not duration <= length:
         raise ValueError(
-            f"window_length must be at most the time of the record, {times[-1] - times[0]:.6g} s; got {asked.window_length!r}; shorten it"
+            f"window_length must be at most the time of the record, {length:.6g} s; got {asked.window_length!r}; shorten it"
         )
     alignment = arguments.one_of("alignment", asked.alignment, ("centre", "trailing", "leading"))
     slack = _SAME * duration
     # Full windows of uniform times hold as many rows wherever they are aligned: one border belongs to them.
-    begins = times + {"centre": -duration / 2 - slack, "trailing": -duration + slack, "leading": -slack}[alignment]
-    first, end = _core.rows_within(times, begins, duration)
-    half = float(np.median(np.diff(times))) / 2
-    within = np.minimum(begins + duration, times[-1] + half + slack) - np.maximum(begins, times[0] - half - slack)
+    begin = {"centre": -duration / 2 - slack, "trailing": -duration + slack, "leading": -slack}[alignment]
+    rows = _core.RowSpans(times, begin, duration)
+    near, within = rows.near_ends(times.usual_step() / 2 + slack)
     flags = np.where(within < duration * (1 - _SAME) - slack, np.uint16(Status.EDGE), np.uint16(0))
     at_least = None
     if asked.min_observations is not None:
-        most = int((end - first).max())
+        most = rows.most_and_fewest()[0]
         at_least = arguments.whole_number("min_observations", asked.min_observations)
         if not regressors < at_least <= most:
             raise ValueError(
@@ -103,16 +111,21 @@ def spans_given(asked: AskedWindows, times: Array, regressors: int) -> Spans:
             )
     else:
         flags = np.where(2 * within < duration * (1 - _SAME), flags | np.uint16(Status.INVALID), flags)
-    return Spans(first, end, flags.astype(np.uint16), at_least)
+    return Spans(rows, near, flags.astype(np.uint16), at_least)
 
 
-def check_uniform(times: Array, *, is_correlated: bool, is_robust: bool) -> None:
+def _steps_of(times: _core.RowTimes) -> str:
+    """Return words for steps that differ."""
+    shortest, longest = times.steps()
+    return f"steps of {shortest:.3g} to {longest:.3g} s"
+
+
+def check_uniform(times: _core.RowTimes, *, is_correlated: bool, is_robust: bool) -> None:
     """Check that nothing is asked for that needs uniform times."""
     for name, wrong, is_wrong in (("covariance", "'hac'", is_correlated), ("loss", "'huber'", is_robust)):
         if is_wrong:
             raise ValueError(
-                f"{name}={wrong} must go with uniform times; got steps of {np.diff(times).min():.3g} to {np.diff(times).max():.3g} s; "
-                f"resample the rows, or leave out {name}"
+                f"{name}={wrong} must go with uniform times; got {_steps_of(times)}; resample the rows, or leave out {name}"
             )
 
 
@@ -124,21 +137,23 @@ def solved(
     solve: Callable[..., _core.RollingRegressions],
 ) -> _core.RollingRegressions:
     """Solve every window; `solve` is the core's function with all that does not depend on windows."""
-    p, count = regressors.shape[1], spans.count
+    p = regressors.shape[1]
     found = solve(
         regressors.T,
         columns.T,
-        {"rows": max(p + 1, int(count.max())), "alignment": "leading", "at_least": spans.at_least, "half_life": None},
+        {"rows": max(p + 1, spans.most), "alignment": "leading", "at_least": spans.at_least, "half_life": None},
         weights=weights,
-        spans=(spans.first, spans.end),
+        spans=spans.rows,
     )
     status = found.status
-    status |= spans.flags
-    least = p + 1 if spans.at_least is None else spans.at_least
-    out = np.flatnonzero((spans.flags & Status.INVALID != 0) | (count < least))
-    few = Status.INVALID if spans.at_least is not None else Status.INVALID | Status.RANK_DEFICIENT
-    invalid = spans.flags[out] & Status.INVALID != 0
-    status[out] = spans.flags[out] | np.where(invalid, np.uint16(Status.INVALID), np.uint16(few))
-    for values in (found.params, found.stderr, found.residuals, found.rss, found.rsquared, found.condition):
-        values[..., out] = np.nan
+    status[spans.near] |= spans.flags
+    few = spans.rows.fewer_than(p + 1 if spans.at_least is None else spans.at_least)
+    code = Status.INVALID if spans.at_least is not None else Status.INVALID | Status.RANK_DEFICIENT
+    status[few] = status[few] & np.uint16(Status.EDGE) | np.uint16(code)
+    invalid = spans.flags & Status.INVALID != 0
+    status[spans.near[invalid]] = spans.flags[invalid]
+    out = np.union1d(few, spans.near[invalid])
+    if out.size:
+        for values in (found.params, found.stderr, found.residuals, found.rss, found.rsquared, found.condition):
+            values[..., out] = np.nan
     return found

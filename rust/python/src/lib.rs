@@ -63,7 +63,7 @@ mod _core {
     #[pymodule_export]
     use crate::respond::{Responses, respond};
     #[pymodule_export]
-    use crate::rolling::{RollingRegressions, rolling_least_squares, rows_within};
+    use crate::rolling::{RollingRegressions, RowSpans, RowTimes, rolling_least_squares};
     #[pymodule_export]
     use crate::sliding::sliding_velocity;
     #[pymodule_export]

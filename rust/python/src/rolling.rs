@@ -1,14 +1,17 @@
 //! `tvident._core.rolling_least_squares`.
 
 use std::num::NonZeroUsize;
+use std::sync::Arc;
 
-use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyUntypedArray};
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tvident::exec::workers as threads;
 use tvident::lanes::Elements;
 use tvident::least_squares::HALF_OF_THE_DIGITS;
-use tvident::least_squares::{Alignment, Equations, Regressions, RollingLeastSquares, Spans, not_before};
+use tvident::least_squares::{
+    Alignment, Equations, Regressions, RollingLeastSquares, RowTimes as CoreTimes, Spans as CoreSpans,
+};
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
@@ -103,28 +106,91 @@ impl RollingRegressions {
     }
 }
 
-/// First rows and rows after the last.
-type RowSpans<'py> = (Bound<'py, PyArray1<usize>>, Bound<'py, PyArray1<usize>>);
+/// Times of rows, seconds from the first on, and what all of them show.
+#[pyclass(frozen, module = "tvident._core")]
+pub(crate) struct RowTimes(Arc<CoreTimes>);
 
-/// The rows whose times lie in each of some spans of a duration: the first, and the one after the last. Neither times nor begins of spans may
-/// decrease.
-#[pyfunction]
-pub(crate) fn rows_within<'py>(
-    py: Python<'py>,
-    times: PyReadonlyArray1<'py, f64>,
-    begins: PyReadonlyArray1<'py, f64>,
-    duration: f64,
-) -> PyResult<RowSpans<'py>> {
-    let (times, begins) = (times.as_slice()?.to_vec(), begins.as_slice()?.to_vec());
-    let first = not_before(&times, begins.iter().copied());
-    let end = not_before(&times, begins.iter().map(|begin| begin + duration));
-    Ok((PyArray1::from_vec(py, first), PyArray1::from_vec(py, end)))
+#[pymethods]
+impl RowTimes {
+    #[new]
+    fn new(times: &Bound<'_, PyUntypedArray>) -> PyResult<Self> {
+        let py = times.py();
+        let times = records(times)?;
+        let [times] = &times[..] else { return Err(PyValueError::new_err("times of one record")) };
+        let read = py.detach(|| CoreTimes::new(times, Instructions::current()));
+        Ok(Self(Arc::new(read.map_err(|error| exception(&error))?)))
+    }
+
+    /// Whether every time is a number, and later than the one before.
+    fn increase(&self) -> bool {
+        self.0.increase()
+    }
+
+    /// The shortest step and the longest.
+    fn steps(&self) -> (f64, f64) {
+        self.0.steps()
+    }
+
+    /// The median of steps all over the record.
+    fn usual_step(&self) -> f64 {
+        self.0.usual_step()
+    }
+
+    /// How far times are from those of a uniform grid between the first and the last, at most.
+    fn farthest(&self) -> f64 {
+        self.0.farthest()
+    }
+
+    /// The largest magnitude of what was given.
+    fn largest(&self) -> f64 {
+        self.0.largest()
+    }
+
+    /// From the first time to the last.
+    fn length(&self) -> f64 {
+        self.0.length()
+    }
+}
+
+/// Windows that the core found, and a number for each.
+type Numbered<'py> = (Bound<'py, PyArray1<usize>>, Bound<'py, PyArray1<f64>>);
+
+/// Windows of a duration, one for every row, which holds the rows from `begin` after its own time on, up to before `duration` later.
+#[pyclass(frozen, module = "tvident._core")]
+pub(crate) struct RowSpans(CoreSpans);
+
+#[pymethods]
+impl RowSpans {
+    #[new]
+    fn new(py: Python<'_>, times: &Bound<'_, RowTimes>, begin: f64, duration: f64) -> PyResult<Self> {
+        let times = Arc::clone(&times.get().0);
+        if !times.increase() || !begin.is_finite() || !(0.0..f64::INFINITY).contains(&duration) {
+            return Err(PyValueError::new_err("times must increase, and spans must be numbers"));
+        }
+        let spans = py.detach(|| CoreSpans::new(times, begin, duration, Instructions::current()));
+        Ok(Self(spans.map_err(|error| exception(&error))?))
+    }
+
+    /// Rows in the window that holds most of them, and in the one that holds fewest.
+    fn most_and_fewest(&self) -> (usize, usize) {
+        self.0.most_and_fewest()
+    }
+
+    /// Windows that hold fewer rows than that.
+    fn fewer_than<'py>(&self, py: Python<'py>, least: usize) -> Bound<'py, PyArray1<usize>> {
+        PyArray1::from_vec(py, self.0.fewer_than(least))
+    }
+
+    /// Windows that reach farther than `reach` beyond the first or the last row, and how much of their duration is no farther than that.
+    fn near_ends<'py>(&self, py: Python<'py>, reach: f64) -> Numbered<'py> {
+        let (windows, within) = self.0.near_ends(reach);
+        (PyArray1::from_vec(py, windows), PyArray1::from_vec(py, within))
+    }
 }
 
 /// Least squares in every window of rows; regressors, right-hand sides and weights have the rows along their last axis. `constant` is the
 /// regressor that is a constant. With `correlated`, which needs a step of 1, standard errors know of residuals that are correlated over so
-/// many `lags`, or over as many as they ask for. `spans` are the first row of each window and the one after its last, where windows hold different
-/// numbers of rows; they need a step of 1 too.
+/// many `lags`, or over as many as they ask for. `spans` are windows that hold different numbers of rows; they need a step of 1 too.
 #[pyfunction]
 #[pyo3(signature = (
     regressors, rhs, windows, *, weights=None, constant=None, correlated=false, lags=None, spans=None, step=1, workers=None, progress=None
@@ -138,7 +204,7 @@ pub(crate) fn rolling_least_squares<'py>(
     constant: Option<usize>,
     correlated: bool,
     lags: Option<usize>,
-    spans: Option<(PyReadonlyArray1<'py, usize>, PyReadonlyArray1<'py, usize>)>,
+    spans: Option<&Bound<'py, RowSpans>>,
     step: usize,
     workers: Option<NonZeroUsize>,
     progress: Option<&Bound<'py, PyAny>>,
@@ -156,12 +222,9 @@ pub(crate) fn rolling_least_squares<'py>(
     let weights = weights.as_ref().and_then(|records| records.first()).map(|record| record as &dyn Samples);
     let equations = Equations { columns, weights, rows: 0..total };
     let (elements, workers) = (Elements { first: 0, step }, threads(workers));
-    // Copies, since others may write to the arrays.
-    let spans =
-        spans.map(|(first, end)| PyResult::Ok((first.as_slice()?.to_vec(), end.as_slice()?.to_vec()))).transpose()?;
-    let spans = spans.as_ref().map(|(first, end)| Spans { first, end });
-    if spans.is_some_and(|spans| !spans.are_of(total)) {
-        return Err(PyValueError::new_err("windows must be in order, within the record, and one for every row"));
+    let spans = spans.map(|spans| &spans.get().0);
+    if spans.is_some_and(|spans| spans.count() != total) {
+        return Err(PyValueError::new_err("there must be one window for every row"));
     }
     RollingRegressions::filled(py, (p, q), (elements, total.div_ceil(step)), true, |mut regressions| {
         for rhs_index in 0..q {

@@ -29,11 +29,6 @@ impl Strips {
         Self { block, columns, values: Aligned::zeros(columns * block) }
     }
 
-    /// Windows of a block.
-    pub(crate) fn block(&self) -> usize {
-        self.block
-    }
-
     /// Number of samples that [`Strips::fill`] takes.
     pub(crate) fn samples(&self) -> usize {
         self.columns * self.block

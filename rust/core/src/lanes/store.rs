@@ -200,13 +200,26 @@ pub(crate) fn write_row(
 }
 
 /// Writes the windows that the tile holds, those of all lanes one after the other from its first place on, to neighbouring elements.
-pub(crate) fn write_block(tile: &Tile, lanes: usize, elements: Range<usize>, outputs: &mut Outputs<'_>) {
+#[inline(always)]
+pub(crate) fn write_block<S: Lanes>(simd: S, tile: &Tile, elements: Range<usize>, outputs: &mut Outputs<'_>) {
+    let lanes = S::F64_LANES;
+    let whole = elements.len() - elements.len() % lanes;
     for (field, values) in outputs.values.iter_mut().enumerate().filter(|(_, values)| !values.is_empty()) {
-        values[elements.clone()].copy_from_slice(&tile.all(field, lanes)[..elements.len()]);
+        let (from, to) = (tile.all(field, lanes), &mut values[elements.clone()]);
+        for at in (0..whole).step_by(lanes) {
+            simd.store(to, at, simd.load(from, at));
+        }
+        for (to, from) in to[whole..].iter_mut().zip(&from[whole..]) {
+            *to = *from;
+        }
     }
     if !outputs.status.is_empty() {
-        let codes = tile.all(outputs.values.len(), lanes);
-        for (status, &code) in outputs.status[elements].iter_mut().zip(codes) {
+        let (codes, to) = (tile.all(outputs.values.len(), lanes), &mut outputs.status[elements]);
+        let mut orders = [0; MOST_LANES];
+        for at in (0..whole).step_by(lanes) {
+            simd.split(simd.load(codes, at), &mut orders, &mut to[at..at + lanes]);
+        }
+        for (status, &code) in to[whole..].iter_mut().zip(&codes[whole..]) {
             *status = parts(code).1;
         }
     }

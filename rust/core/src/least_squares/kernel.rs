@@ -12,7 +12,7 @@ use crate::lanes::store::Write;
 use crate::least_squares::givens_factor::{Dimensions, append, merge};
 use crate::least_squares::plan::Equations;
 use crate::least_squares::side_by_side::{Load, RollingRun, RollingScratch, SEGMENT};
-use crate::least_squares::solutions::{Count, Solutions};
+use crate::least_squares::solutions::{Counts, Solutions};
 use crate::least_squares::window_summary::WindowSummary;
 use crate::simd::vectors::{Kernel, Lanes, apart};
 
@@ -138,8 +138,8 @@ impl<H: Dimensions, const PLAIN: bool> RollingKernel<'_, '_, '_, H, PLAIN> {
         let size = run.plan.summary(shape.size() * S::F64_LANES);
         let summaries = &suffixes[(offsets.start - first) * size..(offsets.end - first) * size];
         let count = |lane: usize, offset: usize| run.count(counts, run.first(lane) + offset);
-        let count: Option<&Count<'_>> = if full { None } else { Some(&count) };
-        apart(simd, Solutions { shape, plan: run.plan, offsets, summaries, count, rows: Some(strips), tile });
+        let counts = if full { Counts::All } else { Counts::Asked(&count) };
+        apart(simd, Solutions { shape, plan: run.plan, offsets, summaries, counts, rows: Some(strips), tile });
     }
 
     /// Writes out the windows at some offsets of each lane's block.

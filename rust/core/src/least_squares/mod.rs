@@ -12,13 +12,16 @@ pub(crate) mod rolling;
 pub(crate) mod rounds;
 pub(crate) mod row_fits;
 pub(crate) mod row_products;
+pub(crate) mod row_times;
 pub(crate) mod side_by_side;
 pub(crate) mod sliding_sums;
 pub(crate) mod solutions;
+pub(crate) mod span_walk;
 pub(crate) mod spans;
 pub(crate) mod stacked_qr;
 pub(crate) mod window_summary;
 
 pub use plan::{Alignment, Equations, HALF_OF_THE_DIGITS, Regressions, RollingLeastSquares};
-pub use spans::{Spans, not_before};
+pub use row_times::RowTimes;
+pub use spans::Spans;
 pub use stacked_qr::{SharedParameters, Summary};

@@ -14,6 +14,16 @@ use crate::status::Status;
 /// How many rows of a lane's window at an offset count.
 pub(crate) type Count<'a> = dyn Fn(usize, usize) -> usize + 'a;
 
+/// How many rows of windows count.
+#[derive(Clone, Copy)]
+pub(crate) enum Counts<'a> {
+    /// All that windows have.
+    All,
+    Asked(&'a Count<'a>),
+    /// Those of one window after the other, lane by lane.
+    Listed(&'a [f64]),
+}
+
 /// The kernel that solves neighbouring windows of each lane. All kernels that make factors use it.
 pub(crate) struct Solutions<'a, 'b, H: Dimensions> {
     pub(crate) shape: H,
@@ -21,8 +31,7 @@ pub(crate) struct Solutions<'a, 'b, H: Dimensions> {
     /// Offsets of the windows in their blocks, and their summaries one after the other.
     pub(crate) offsets: Range<usize>,
     pub(crate) summaries: &'a [f64],
-    /// Rows that count, where not every window is full.
-    pub(crate) count: Option<&'a Count<'a>>,
+    pub(crate) counts: Counts<'a>,
     /// The columns of the rows, where what is left of them can be told.
     pub(crate) rows: Option<&'a [Strips]>,
     pub(crate) tile: &'b mut Tile,
@@ -33,20 +42,28 @@ impl<H: Dimensions> Kernel for Solutions<'_, '_, H> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
-        let Self { shape, plan, offsets, summaries, count, rows, tile } = self;
+        let Self { shape, plan, offsets, summaries, counts, rows, tile } = self;
         let size = plan.summary(shape.size() * S::F64_LANES);
         let mut summary = WindowSummary::nothing(simd, shape, plan.fading.is_some());
         let mut values = shape.factor(simd.splat_f64s(0.0));
-        let one_over = |count: usize| 1.0 / count.saturating_sub(shape.regressors()) as f64;
-        let mut freedom = simd.splat_f64s(one_over(plan.window));
-        for (offset, numbers) in offsets.zip(summaries.chunks_exact(size)) {
+        let one = simd.splat_f64s(1.0);
+        let parameters = simd.splat_f64s(shape.regressors() as f64);
+        let beyond = |counts| simd.max_f64s(simd.sub_f64s(counts, parameters), simd.splat_f64s(0.0));
+        let mut freedom = simd.div_f64s(one, beyond(simd.splat_f64s(plan.window as f64)));
+        for (place, (offset, numbers)) in offsets.zip(summaries.chunks_exact(size)).enumerate() {
             summary.load(simd, shape, numbers);
-            if let Some(count) = count {
-                let mut lanes = [0.0; MOST_LANES];
-                for (lane, freedom) in lanes[..S::F64_LANES].iter_mut().enumerate() {
-                    *freedom = one_over(count(lane, offset));
+            match counts {
+                Counts::All => {}
+                Counts::Asked(count) => {
+                    let mut lanes = [0.0; MOST_LANES];
+                    for (lane, rows) in lanes[..S::F64_LANES].iter_mut().enumerate() {
+                        *rows = count(lane, offset) as f64;
+                    }
+                    freedom = simd.div_f64s(one, beyond(simd.load(&lanes, 0)));
                 }
-                freedom = simd.load(&lanes, 0);
+                Counts::Listed(listed) => {
+                    freedom = simd.div_f64s(one, beyond(simd.load(listed, place * S::F64_LANES)));
+                }
             }
             let own = offset + plan.before;
             let (own, block) = if own < plan.window { (own, 0) } else { (own - plan.window, 1) };

@@ -1,437 +1,282 @@
-//! Least squares in windows that hold different numbers of rows, as those of a duration do on irregular times.
-//!
-//! No window begins or ends before the one before it. Windows that reach up to a boundary between two rows, or over it, are a run: each is
-//! a suffix of the rows before the boundary and a prefix of those after it, so every row is appended once to either and every window is
-//! one merge of two factors, as where all windows hold as many rows. The first window of a run ends at its boundary; runs follow from the
-//! windows alone. Suffixes and prefixes of several runs are made side by side, one run a lane, then neighbouring windows of a run are merged
-//! and solved, one a lane.
+//! Which rows lie in windows of a duration on irregular times, and which windows reach over one boundary.
 
-use std::num::NonZeroUsize;
 use std::ops::Range;
+use std::sync::Arc;
 
 use crate::error::Error;
-use crate::exec::memory;
-use crate::exec::pool::{self, GoOn, Piece, Watch};
-use crate::lanes::interleaved::Strips;
-use crate::lanes::output::Outputs;
-use crate::lanes::store::write_block;
-use crate::lanes::tile::{TILE, Tile};
-use crate::least_squares::givens_factor::{Dimensions, Few, Many, append, empty, load, merge, store};
-use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares, Slots};
-use crate::least_squares::solutions::{Count, Solutions};
-use crate::record::samples::{all_usable, is_usable};
-use crate::simd::aligned::Aligned;
-use crate::simd::vectors::{Kernel, Lanes, MOST_LANES, apart, dispatch, dispatch_vectors};
-use crate::status::Status;
+use crate::exec::huge_pages::zeros;
+use crate::least_squares::row_times::RowTimes;
+use crate::simd::instructions::Instructions;
+use crate::simd::vectors::{Kernel, Lanes, MOST_LANES, dispatch};
 
-/// Rows of every lane between two calls of `go_on`.
-const ASK: usize = 256;
-
-/// The rows of every window: from one on, up to before another. Neither may be less than that of the window before.
-#[derive(Clone, Copy, Debug)]
-pub struct Spans<'a> {
-    /// First rows.
-    pub first: &'a [usize],
-    /// Rows after the last.
-    pub end: &'a [usize],
+/// One window of a duration for every row: it holds the rows from `begin` after the time of its own row on, up to before `duration` later.
+/// No window begins or ends before the one before it.
+#[derive(Clone, Debug)]
+pub struct Spans {
+    times: Arc<RowTimes>,
+    begin: f64,
+    duration: f64,
+    runs: Vec<Run>,
+    /// Rows of every window before the boundary of its run, and from there on.
+    before: Vec<u32>,
+    after: Vec<u32>,
+    most: usize,
+    fewest: usize,
 }
 
 /// Windows that reach up to a boundary or over it.
 #[derive(Clone, Debug)]
-struct Run {
-    windows: Range<usize>,
+pub(crate) struct Run {
+    pub(crate) windows: Range<usize>,
     /// Rows before this one, and from it on.
-    boundary: usize,
-    before: usize,
-    after: usize,
+    pub(crate) boundary: usize,
+    pub(crate) before: usize,
+    pub(crate) after: usize,
 }
 
-/// For each of some times that never decrease, the first of others that is not before it.
-///
-/// The others must not decrease either.
-#[must_use]
-pub fn not_before(times: &[f64], from: impl Iterator<Item = f64>) -> Vec<usize> {
-    let mut place = 0;
-    let next = |from: f64| {
-        while times.get(place).is_some_and(|time| *time < from) {
-            place += 1;
-        }
-        place
-    };
-    from.map(next).collect()
+/// The places that windows begin and end at, which only move on.
+#[derive(Clone, Copy, Debug, Default)]
+struct SpanPlaces {
+    first: usize,
+    end: usize,
 }
 
-impl Spans<'_> {
-    /// Whether there is a window for each of some rows, and windows are in order and within the record.
-    #[must_use]
-    pub fn are_of(&self, rows: usize) -> bool {
-        let in_order = |numbers: &[usize]| numbers.is_sorted();
-        self.first.len() == rows
-            && self.end.len() == rows
-            && in_order(self.first)
-            && in_order(self.end)
-            && self.first.iter().zip(self.end).all(|(first, end)| first <= end && *end <= rows)
-    }
-
-    fn runs(&self) -> Vec<Run> {
-        let mut runs = Vec::new();
-        let mut window = 0;
-        while window < self.first.len() {
-            let boundary = self.end[window];
-            let end = window + self.first[window..].partition_point(|first| *first <= boundary);
-            let (before, after) = (boundary - self.first[window], self.end[end - 1] - boundary);
-            runs.push(Run { windows: window..end, boundary, before, after });
-            window = end;
-        }
-        runs
-    }
+/// The rows of neighbouring windows, one in each of the first lanes: first rows, and those after the last.
+struct RowsSpanned {
+    count: usize,
+    first: [usize; MOST_LANES],
+    end: [usize; MOST_LANES],
 }
 
-/// Memory of one thread.
-#[derive(Default)]
-struct SpanScratch {
-    /// The rows of some runs, column by column, zero where they do not count; weights come last, where there are any.
-    rows: Vec<Vec<f64>>,
-    /// Whether all of them count; otherwise those that count before each, and those that are missing.
-    whole: bool,
-    counts: Vec<u32>,
-    missing: Vec<u32>,
-    lane: Vec<f64>,
-    strips: Vec<[Strips; 2]>,
-    /// Factors of the last rows before each lane's boundary, and of the first after it: none, one, two … of them.
-    suffixes: Aligned,
-    prefixes: Aligned,
-    windows: Aligned,
-    tile: Option<Tile>,
-}
-
-impl RollingLeastSquares {
-    /// Solves windows that hold different numbers of rows, one for every row. The plan says how many rows they must hold, what results they
-    /// have, and the most rows that one holds.
+impl Spans {
+    /// The windows of a duration around, before or after the times of rows, which must [`RowTimes::increase`].
     ///
     /// # Errors
-    /// If there is not the memory for the windows, or the watch cancels.
+    /// If there is not the memory for what they hold.
     ///
     /// # Panics
-    /// If the windows are not [`Spans::are_of`] the rows.
-    pub fn run_spans(
-        &self,
-        equations: &Equations<'_>,
-        spans: Spans<'_>,
-        mut regressions: Regressions<'_>,
-        workers: NonZeroUsize,
-        watch: &mut Watch<'_>,
-    ) -> Result<(), Error> {
-        let total = equations.columns.first().map_or(0, |column| column.len());
-        assert!(spans.are_of(total), "windows in order, one for every row");
-        let (runs, lanes) = (spans.runs(), self.instructions.lanes());
-        let mut pieces = Vec::new();
-        for runs in runs.chunks(lanes) {
-            let windows = runs[0].windows.start..runs[runs.len() - 1].windows.end;
-            let part = regressions.split_off_before(windows.end);
-            pieces.push(Piece { size: windows.len(), content: (runs, part) });
+    /// If times do not increase, or spans are no numbers.
+    pub fn new(times: Arc<RowTimes>, begin: f64, duration: f64, instructions: Instructions) -> Result<Self, Error> {
+        assert!(times.increase() && begin.is_finite() && (0.0..f64::INFINITY).contains(&duration), "spans in order");
+        let count = times.since.len();
+        if u32::try_from(count).is_err() {
+            return Err(Error::Memory { bytes: usize::MAX });
         }
-        let most = runs.iter().map(|run| run.before.max(run.after)).max().unwrap_or(0);
-        let factor = Many { regressors: self.regressors, rhs_count: self.rhs_count }.size();
-        let numbers = most.saturating_mul(2 * lanes).saturating_mul(factor + 2 * self.columns() + 2);
-        memory::ask_for_numbers(numbers.saturating_mul(workers.get().min(pieces.len())))?;
-        let work = |(runs, mut part): (&[Run], Regressions<'_>), scratch: &mut SpanScratch, go_on: &GoOn<'_>| {
-            let mut outputs = Slots::of(self).outputs(&mut part);
-            let group = SomeRuns { plan: self, equations, spans, runs };
-            match self.few() {
-                Some(1) => group.solve(Few::<1>, scratch, &mut outputs, go_on),
-                Some(2) => group.solve(Few::<2>, scratch, &mut outputs, go_on),
-                Some(3) => group.solve(Few::<3>, scratch, &mut outputs, go_on),
-                Some(4) => group.solve(Few::<4>, scratch, &mut outputs, go_on),
-                _ => {
-                    let shape = Many { regressors: self.regressors, rhs_count: self.rhs_count };
-                    dispatch(self.instructions, SpanKernel { group, shape, scratch, outputs: &mut outputs, go_on });
-                }
-            }
+        let (before, after) = (zeros(count)?, zeros(count)?);
+        let mut spans = Self { times, begin, duration, runs: Vec::new(), before, after, most: 0, fewest: usize::MAX };
+        dispatch(instructions, SpanSurvey(&mut spans));
+        Ok(spans)
+    }
+
+    /// Rows, and windows.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.times.since.len()
+    }
+
+    /// Rows in the window that holds most of them, and in the one that holds fewest.
+    #[must_use]
+    pub fn most_and_fewest(&self) -> (usize, usize) {
+        (self.most, self.fewest)
+    }
+
+    /// Windows that hold fewer rows than that.
+    #[must_use]
+    pub fn fewer_than(&self, least: usize) -> Vec<usize> {
+        if self.fewest >= least {
+            return Vec::new();
+        }
+        (0..self.count()).filter(|&window| self.held(window) < least).collect()
+    }
+
+    /// Windows that reach farther than `reach` beyond the first or the last row, and how much of their duration is no farther than that.
+    #[must_use]
+    pub fn near_ends(&self, reach: f64) -> (Vec<usize>, Vec<f64>) {
+        let (since, length) = (&self.times.since, self.times.length());
+        let begin = |time: f64| time + self.begin;
+        let from_start = since.partition_point(|&time| begin(time) < -reach);
+        let to_end = since.partition_point(|&time| begin(time) + self.duration <= length + reach).max(from_start);
+        let within = |window: usize| {
+            let begin = begin(since[window]);
+            (begin + self.duration).min(length + reach) - begin.max(-reach)
         };
-        pool::run_long(pieces, workers, SpanScratch::default, work, watch)
+        let windows: Vec<usize> = (0..from_start).chain(to_end..since.len()).collect();
+        let within = windows.iter().map(|&window| within(window)).collect();
+        (windows, within)
+    }
+
+    pub(crate) fn runs(&self) -> &[Run] {
+        &self.runs
+    }
+
+    /// How many rows some windows hold before the boundary of their run, and from there on.
+    #[inline(always)]
+    pub(crate) fn around_boundary(&self, windows: Range<usize>) -> (&[u32], &[u32]) {
+        (&self.before[windows.clone()], &self.after[windows])
+    }
+
+    /// Rows of a window.
+    fn held(&self, window: usize) -> usize {
+        self.before[window] as usize + self.after[window] as usize
     }
 }
 
-/// Runs that are worked on side by side.
-#[derive(Clone, Copy)]
-struct SomeRuns<'a> {
-    plan: &'a RollingLeastSquares,
-    equations: &'a Equations<'a>,
-    spans: Spans<'a>,
-    runs: &'a [Run],
+impl SpanPlaces {
+    /// The rows of the windows from one on up to before another, as many as there are lanes.
+    #[inline(always)]
+    fn next<S: Lanes>(&mut self, simd: S, spans: &Spans, windows: Range<usize>) -> RowsSpanned {
+        let since = &spans.times.since[..];
+        let count = S::F64_LANES.min(windows.len());
+        let mut own = [since[windows.start + count - 1]; MOST_LANES];
+        own[..count].copy_from_slice(&since[windows.start..windows.start + count]);
+        let begins = simd.add_f64s(simd.load(&own, 0), simd.splat_f64s(spans.begin));
+        let ends = simd.add_f64s(begins, simd.splat_f64s(spans.duration));
+        let (first, first_of) = not_before(simd, since, self.first, begins);
+        let (end, end_of) = not_before(simd, since, self.end, ends);
+        *self = Self { first, end };
+        RowsSpanned { count, first: first_of, end: end_of }
+    }
 }
 
-impl SomeRuns<'_> {
-    /// Solves the windows of the runs, with vectors.
-    fn solve<H: Dimensions>(self, shape: H, scratch: &mut SpanScratch, outputs: &mut Outputs<'_>, go_on: &GoOn<'_>) {
-        dispatch_vectors(self.plan.instructions, SpanKernel { group: self, shape, scratch, outputs, go_on });
-    }
-
-    fn windows(&self) -> Range<usize> {
-        self.runs[0].windows.start..self.runs[self.runs.len() - 1].windows.end
-    }
-
-    /// The rows of all windows.
-    fn rows(&self) -> Range<usize> {
-        let windows = self.windows();
-        self.spans.first[windows.start]..self.spans.end[windows.end - 1]
-    }
-
-    /// Reads the rows of all windows. Those that do not count become zero.
-    fn read(&self, scratch: &mut SpanScratch) {
-        let SpanScratch { rows, whole, counts, missing, .. } = scratch;
-        let of = self.rows();
-        let sources = self.equations.columns.iter().copied().chain(self.equations.weights);
-        rows.resize_with(self.plan.columns() + usize::from(self.equations.weights.is_some()), Vec::new);
-        for (into, source) in rows.iter_mut().zip(sources) {
-            into.resize(of.len(), 0.0);
-            source.read(of.start, into);
+/// For times that never decrease from lane to lane, the first row that is not before each, from a row on: that of the last lane, and all.
+#[inline(always)]
+fn not_before<S: Lanes>(simd: S, since: &[f64], from: usize, times: S::f64s) -> (usize, [usize; MOST_LANES]) {
+    let mut lanes = [0.0; MOST_LANES];
+    simd.store(&mut lanes, 0, times);
+    let last = lanes[S::F64_LANES - 1];
+    let (one, none) = (simd.splat_u64s(1), simd.splat_u64s(0));
+    let (mut passed, mut place) = (none, from);
+    for &time in &since[from..] {
+        // Times are numbers.
+        if time >= last {
+            break;
         }
-        let (columns, weights) = rows.split_at_mut(self.plan.columns());
-        *whole = weights.is_empty() && columns.iter().all(|column| all_usable(column));
-        if *whole {
-            return;
-        }
-        counts.clear();
-        missing.clear();
-        let (mut count, mut lost) = (0, 0);
-        counts.push(count);
-        missing.push(lost);
-        for row in 0..of.len() {
-            let has_weight = weights.iter().all(|weights| weights[row] > 0.0);
-            if has_weight && columns.iter().all(|column| is_usable(column[row])) {
-                count += 1;
-            } else {
-                for column in columns.iter_mut().chain(weights.iter_mut()) {
-                    column[row] = 0.0;
-                }
-                lost += u32::from(has_weight);
-            }
-            counts.push(count);
-            missing.push(lost);
-        }
+        let is_before = simd.less_than_f64s(simd.splat_f64s(time), times);
+        passed = simd.add_u64s(passed, simd.select_u64s(is_before, one, none));
+        place += 1;
     }
+    simd.store(&mut lanes, 0, simd.transmute_f64s_u64s(passed));
+    let mut rows = [from; MOST_LANES];
+    for (row, passed) in rows[..S::F64_LANES].iter_mut().zip(lanes) {
+        *row += usize::try_from(passed.to_bits()).unwrap_or(usize::MAX);
+    }
+    (place, rows)
 }
 
-/// The kernel that solves the windows of some runs.
-struct SpanKernel<'a, 'b, 'c, H: Dimensions> {
-    group: SomeRuns<'a>,
-    shape: H,
-    scratch: &'b mut SpanScratch,
-    outputs: &'b mut Outputs<'c>,
-    go_on: &'b GoOn<'b>,
-}
+/// The kernel that finds the runs of windows and how many rows they hold.
+struct SpanSurvey<'a>(&'a mut Spans);
 
-impl<H: Dimensions> Kernel for SpanKernel<'_, '_, '_, H> {
+impl Kernel for SpanSurvey<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<S: Lanes>(mut self, simd: S) {
-        self.group.read(self.scratch);
-        self.lay_out(simd);
-        if !self.build(simd) {
-            return;
-        }
-        for lane in 0..self.group.runs.len() {
-            if !(self.go_on)() {
-                return;
+    fn run<S: Lanes>(self, simd: S) {
+        let Self(spans) = self;
+        let total = spans.count();
+        let (mut runs, mut most, mut fewest) = (Vec::<Run>::new(), 0, usize::MAX);
+        let (mut befores, mut afters) = (std::mem::take(&mut spans.before), std::mem::take(&mut spans.after));
+        // No run yet: the first window is beyond its boundary.
+        let (mut walk, mut boundary, mut end) = (SpanPlaces::default(), None, 0);
+        for window in (0..total).step_by(S::F64_LANES) {
+            let rows = walk.next(simd, spans, window..total);
+            let own = window..window + rows.count;
+            let (before, after) = (&mut befores[own.clone()], &mut afters[own]);
+            for lane in 0..rows.count {
+                let held = rows.end[lane] - rows.first[lane];
+                most = most.max(held);
+                fewest = fewest.min(held);
             }
-            self.solve(simd, lane);
-        }
-        self.leave_residuals();
-        self.mark();
-    }
-}
-
-impl<H: Dimensions> SpanKernel<'_, '_, '_, H> {
-    /// Lays the rows before each boundary and after it side by side.
-    #[inline(always)]
-    fn lay_out<S: Lanes>(&mut self, simd: S) {
-        let SpanScratch { rows, lane, strips, .. } = &mut *self.scratch;
-        let (runs, first) = (self.group.runs, self.group.rows().start);
-        let longest = |of: &dyn Fn(&Run) -> usize| runs.iter().map(of).max().unwrap_or(0).max(S::F64_LANES);
-        let lengths = [longest(&|run| run.before), longest(&|run| run.after)];
-        let make = |length: usize| Strips::new(length, length, S::F64_LANES);
-        let fits = |strips: &Strips, length: usize| (length..=2 * length).contains(&strips.block());
-        if strips.len() != rows.len()
-            || !lengths.iter().enumerate().all(|(side, &length)| fits(&strips[0][side], length))
-        {
-            strips.clear();
-            strips.resize_with(rows.len(), || lengths.map(make));
-        }
-        for (column, strips) in rows.iter().zip(strips) {
-            for (side, strips) in strips.iter_mut().enumerate() {
-                let block = strips.block();
-                lane.clear();
-                lane.resize(strips.samples(), 0.0);
-                for (run, lane) in runs.iter().zip(lane.chunks_mut(block)) {
-                    let middle = run.boundary - first;
-                    if side == 0 {
-                        lane[block - run.before..].copy_from_slice(&column[middle - run.before..middle]);
-                    } else {
-                        lane[..run.after].copy_from_slice(&column[middle..middle + run.after]);
+            let mut of = [boundary.unwrap_or(0); MOST_LANES];
+            if boundary.is_none_or(|boundary| rows.first[rows.count - 1] > boundary) {
+                for (lane, of) in of.iter_mut().enumerate().take(rows.count) {
+                    if boundary.is_none_or(|boundary| rows.first[lane] > boundary) {
+                        close(&mut runs, window + lane, end);
+                        boundary = Some(rows.end[lane]);
+                        let before = rows.end[lane] - rows.first[lane];
+                        runs.push(Run { windows: window + lane..total, boundary: rows.end[lane], before, after: 0 });
                     }
+                    *of = boundary.unwrap_or(0);
+                    end = rows.end[lane];
                 }
-                strips.fill(simd, lane);
             }
+            #[allow(clippy::cast_possible_truncation, reason = "there are no more rows than that")]
+            for lane in 0..rows.count {
+                before[lane] = (of[lane] - rows.first[lane]) as u32;
+                after[lane] = (rows.end[lane] - of[lane]) as u32;
+            }
+            end = rows.end[rows.count - 1];
         }
-    }
-
-    /// Makes the factors of all suffixes and prefixes. Returns whether the work goes on.
-    #[inline(always)]
-    fn build<S: Lanes>(&mut self, simd: S) -> bool {
-        let (shape, runs) = (self.shape, self.group.runs);
-        let size = shape.size() * S::F64_LANES;
-        let SpanScratch { strips, suffixes, prefixes, .. } = &mut *self.scratch;
-        let columns = shape.regressors() + shape.rhs_count();
-        let mut row = shape.factor(simd.splat_f64s(0.0));
-        for (side, factors) in [suffixes, prefixes].into_iter().enumerate() {
-            let length = runs.iter().map(|run| if side == 0 { run.before } else { run.after }).max().unwrap_or(0);
-            if factors.len() < (length + 1) * size {
-                *factors = Aligned::zeros((length + 1) * size);
-            }
-            let block = strips[0][side].block();
-            let mut factor = empty(simd, shape);
-            store(simd, shape, &mut factors[..size], &factor);
-            for step in 0..length {
-                if step % ASK == 0 && !(self.go_on)() {
-                    return false;
-                }
-                let place = strips[0][side].place(if side == 0 { block - 1 - step } else { step }, 0);
-                for (column, strips) in strips[..columns].iter().enumerate() {
-                    row[column] = strips[side].in_place(simd, place);
-                }
-                // Rows that do not count are zero: whatever their weight, they change nothing.
-                let weight = match strips.get(columns) {
-                    Some(weights) => weights[side].in_place(simd, place),
-                    None => simd.splat_f64s(1.0),
-                };
-                append(simd, shape, &mut factor, &mut row, 0, weight);
-                store(simd, shape, &mut factors[(step + 1) * size..][..size], &factor);
-            }
-        }
-        true
-    }
-
-    /// Solves the windows of the run of a lane.
-    #[inline(always)]
-    fn solve<S: Lanes>(&mut self, simd: S, lane: usize) {
-        let (shape, group) = (self.shape, self.group);
-        let (plan, run) = (group.plan, &group.runs[lane]);
-        let size = shape.size() * S::F64_LANES;
-        let places = TILE.min(1024 / S::F64_LANES / Slots::of(plan).fields()).max(1);
-        let places = if places.is_power_of_two() { places } else { places.next_power_of_two() / 2 };
-        let first_row = group.rows().start;
-        let (mut suffix, mut prefix) = (empty(simd, shape), empty(simd, shape));
-        let mut row = shape.factor(simd.splat_f64s(0.0));
-        let mut gathered = [Aligned::zeros(size), Aligned::zeros(size)];
-        for first in run.windows.clone().step_by(places * S::F64_LANES) {
-            let some = first..run.windows.end.min(first + places * S::F64_LANES);
-            let SpanScratch { suffixes, prefixes, windows, tile, counts, whole, .. } = &mut *self.scratch;
-            if windows.len() < places * size {
-                *windows = Aligned::zeros(places * size);
-            }
-            let vectors = some.len().div_ceil(S::F64_LANES);
-            for vector in 0..vectors {
-                for place in 0..S::F64_LANES {
-                    // Beyond the last window the last is solved again.
-                    let window = (first + vector * S::F64_LANES + place).min(some.end - 1);
-                    let (before, after) =
-                        (run.boundary - group.spans.first[window], group.spans.end[window] - run.boundary);
-                    let [of_suffix, of_prefix] = &mut gathered;
-                    take(&suffixes[before * size..][..size], lane, of_suffix, place, S::F64_LANES);
-                    take(&prefixes[after * size..][..size], lane, of_prefix, place, S::F64_LANES);
-                }
-                load(simd, shape, &gathered[0], &mut suffix);
-                load(simd, shape, &gathered[1], &mut prefix);
-                merge(simd, shape, &mut suffix, &prefix, &mut row);
-                store(simd, shape, &mut windows[vector * size..][..size], &suffix);
-            }
-            let count = |lane: usize, vector: usize| {
-                let window = (first + vector * S::F64_LANES + lane).min(some.end - 1);
-                let (first, end) = (group.spans.first[window], group.spans.end[window]);
-                if *whole { end - first } else { (counts[end - first_row] - counts[first - first_row]) as usize }
-            };
-            let tile = tile.get_or_insert_with(|| Tile::new(Slots::of(plan).fields(), places, S::F64_LANES));
-            let summaries = &windows[..vectors * size];
-            let count = Some(&count as &Count<'_>);
-            apart(simd, Solutions { shape, plan, offsets: 0..vectors, summaries, count, rows: None, tile: &mut *tile });
-            let elements = self.outputs.elements.of(some);
-            write_block(tile, S::F64_LANES, elements, self.outputs);
-        }
-    }
-
-    /// Writes what windows leave at their own rows, where that is asked for.
-    fn leave_residuals(&mut self) {
-        let (plan, group) = (self.group.plan, self.group);
-        if !plan.fit {
-            return;
-        }
-        let (p, q, slots) = (plan.regressors, plan.rhs_count, Slots::of(plan));
-        let SpanScratch { rows: columns, whole, counts, .. } = &*self.scratch;
-        let (windows, rows) = (group.windows(), group.rows());
-        // Of windows that do not hold their own rows these may be elsewhere.
-        let inside = windows.start.max(rows.start)..windows.end.min(rows.end);
-        let elements = self.outputs.elements;
-        let (results, left) = self.outputs.values.split_at_mut(slots.own_residuals);
-        for (rhs, left) in left[..q].iter_mut().enumerate().filter(|(_, left)| !left.is_empty()) {
-            left[elements.of(windows.clone())].fill(f64::NAN);
-            if inside.is_empty() {
-                continue;
-            }
-            let places = inside.start - rows.start..inside.end - rows.start;
-            let left = &mut left[elements.of(inside.clone())];
-            left.copy_from_slice(&columns[p + rhs][places.clone()]);
-            for (regressor, column) in columns[..p].iter().enumerate() {
-                let values = &results[regressor * q + rhs][elements.of(inside.clone())];
-                for ((left, value), x) in left.iter_mut().zip(values).zip(&column[places.clone()]) {
-                    *left -= x * value;
-                }
-            }
-            for (left, place) in left.iter_mut().zip(places).filter(|_| !whole) {
-                if counts[place + 1] == counts[place] {
-                    *left = f64::NAN;
-                }
-            }
-        }
-    }
-
-    /// Flags windows that lack rows, and invalidates those that have too few or hold an unusable value.
-    fn mark(&mut self) {
-        let (plan, group) = (self.group.plan, self.group);
-        let SpanScratch { whole, counts, missing, .. } = &*self.scratch;
-        let start = group.rows().start;
-        for window in group.windows() {
-            let (first, end) = (group.spans.first[window] - start, group.spans.end[window] - start);
-            let (count, lost) = if *whole {
-                (end - first, 0)
-            } else {
-                ((counts[end] - counts[first]) as usize, missing[end] - missing[first])
-            };
-            let flags = if lost > 0 && plan.at_least.is_some() { Status::GAP } else { Status::GOOD };
-            let is_spoilt = lost > 0 && plan.at_least.is_none();
-            if is_spoilt || plan.at_least.is_some_and(|least| count < least) {
-                self.outputs.invalidate(window..window + 1, flags | Status::INVALID);
-            } else if count <= plan.regressors {
-                self.outputs.invalidate(window..window + 1, flags | Status::INVALID | Status::RANK_DEFICIENT);
-                let elements = self.outputs.elements.of(window..window + 1);
-                if let Some(condition) = self.outputs.values.last_mut().filter(|condition| !condition.is_empty()) {
-                    condition[elements].fill(f64::INFINITY);
-                }
-            } else if flags != Status::GOOD && !self.outputs.status.is_empty() {
-                let elements = self.outputs.elements.of(window..window + 1);
-                self.outputs.status[elements].iter_mut().for_each(|status| *status |= flags.bits());
-            }
-        }
+        close(&mut runs, total, end);
+        (spans.runs, spans.most, spans.fewest) = (runs, most, fewest);
+        (spans.before, spans.after) = (befores, afters);
     }
 }
 
-/// Copies the factor of one lane to a place of others.
-#[inline(always)]
-fn take(factor: &[f64], lane: usize, into: &mut [f64], place: usize, lanes: usize) {
-    debug_assert!(lanes <= MOST_LANES);
-    for (from, into) in factor.chunks_exact(lanes).zip(into.chunks_exact_mut(lanes)) {
-        into[place] = from[lane];
+/// Ends the last run before a window, where windows reach up to before a row.
+fn close(runs: &mut [Run], window: usize, end: usize) {
+    if let Some(run) = runs.last_mut() {
+        run.windows.end = window;
+        run.after = end - run.boundary;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Steps from very short to long ones, the same at every call.
+    fn times(count: u32) -> Vec<f64> {
+        let steps = (0..count).map(|row| 10.0_f64.powf(3.0 * (f64::from(row) * 0.7).sin() - 1.0));
+        let next = |time: &mut f64, step: f64| Some(std::mem::replace(time, *time + step));
+        steps.scan(100.0, next).collect()
+    }
+
+    #[test]
+    fn windows_hold_the_rows_within_and_runs_reach_over_their_boundaries() {
+        for count in [1, 2, 7, 8, 9, 400] {
+            let given = times(count);
+            let count = given.len();
+            for (begin, duration) in [(-1.0, 2.0), (-30.0, 30.5), (-1e-3, 100.0), (0.0, 0.0), (-1e6, 2e6), (5.0, 1.0)] {
+                for instructions in Instructions::available() {
+                    let times = Arc::new(RowTimes::new(&given.as_slice(), instructions).unwrap());
+                    let since = times.since.clone();
+                    let spans = Spans::new(times, begin, duration, instructions).unwrap();
+                    let of = |border: f64| since.partition_point(|&time| time < border);
+                    let rows: Vec<Range<usize>> =
+                        since.iter().map(|time| of(time + begin)..of(time + begin + duration)).collect();
+                    let held = || rows.iter().map(Range::len);
+                    assert_eq!(Some(spans.most_and_fewest()), held().max().zip(held().min()));
+                    let least = held().sum::<usize>() / count;
+                    let fewer = (0..count).filter(|&window| rows[window].len() < least);
+                    assert_eq!(spans.fewer_than(least), fewer.collect::<Vec<_>>());
+                    let mut next = 0;
+                    for run in spans.runs() {
+                        assert_eq!(run.windows.start, next);
+                        next = run.windows.end;
+                        let mine = &rows[run.windows.clone()];
+                        assert!(mine.iter().all(|rows| rows.start <= run.boundary && rows.end >= run.boundary));
+                        assert_eq!((mine[0].len(), mine[0].end), (run.before, run.boundary));
+                        assert_eq!(mine[mine.len() - 1].end, run.boundary + run.after);
+                        assert!(rows.get(next).is_none_or(|rows| rows.start > run.boundary));
+                        let (before, after) = spans.around_boundary(run.windows.clone());
+                        for (rows, (&before, &after)) in mine.iter().zip(before.iter().zip(after)) {
+                            assert_eq!(*rows, run.boundary - before as usize..run.boundary + after as usize);
+                        }
+                    }
+                    assert_eq!(next, count);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn windows_near_the_ends_have_only_part_of_their_duration() {
+        let given: Vec<f64> = (0..100).map(f64::from).collect();
+        let instructions = Instructions::current();
+        let times = Arc::new(RowTimes::new(&given.as_slice(), instructions).unwrap());
+        let spans = Spans::new(times, -10.0, 20.0, instructions).unwrap();
+        let (windows, within) = spans.near_ends(0.5);
+        assert_eq!(windows, (0..10).chain(90..100).collect::<Vec<_>>());
+        assert!(within.iter().zip(&windows).all(|(within, &window)| *within == 10.5 + window.min(99 - window) as f64));
     }
 }
