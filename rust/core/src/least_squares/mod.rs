@@ -16,6 +16,7 @@ pub(crate) mod row_times;
 pub(crate) mod side_by_side;
 pub(crate) mod sliding_sums;
 pub(crate) mod solutions;
+pub(crate) mod span_factors;
 pub(crate) mod span_walk;
 pub(crate) mod spans;
 pub(crate) mod stacked_qr;

@@ -17,6 +17,7 @@ use crate::lanes::tile::Tile;
 use crate::least_squares::givens_factor::{Dimensions, Few, Many, append, empty, merge, store};
 use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares, Slots};
 use crate::least_squares::solutions::{Counts, Solutions};
+use crate::least_squares::span_factors::FactorStorage;
 use crate::least_squares::spans::{Run, Spans};
 use crate::record::samples::{all_usable, is_usable};
 use crate::simd::aligned::Aligned;
@@ -262,17 +263,17 @@ impl<H: Dimensions> SpanKernel<'_, '_, '_, H> {
     #[inline(always)]
     fn build<S: Lanes>(&mut self, simd: S) -> bool {
         let shape = self.shape;
-        let size = shape.size() * S::F64_LANES;
         let SpanScratch { rows, laid, suffixes, prefixes, .. } = &mut *self.scratch;
         let columns = shape.regressors() + shape.rhs_count();
         let apart = rows.len() * S::F64_LANES;
         let mut row = shape.factor(simd.splat_f64s(0.0));
         for ((laid, factors), length) in laid.iter().zip([suffixes, prefixes]).zip(self.group.longest()) {
-            if factors.len() < (length + 1) * size {
-                *factors = Aligned::zeros((length + 1) * size);
+            let storage = FactorStorage::of::<S, H>(shape, length);
+            if factors.len() < storage.numbers {
+                *factors = Aligned::zeros(storage.numbers);
             }
             let mut factor = empty(simd, shape);
-            store(simd, shape, &mut factors[..size], &factor);
+            storage.put(simd, shape, factors, 0, &factor);
             for step in 0..length {
                 if step % ASK == 0 && !(self.go_on)() {
                     return false;
@@ -288,7 +289,7 @@ impl<H: Dimensions> SpanKernel<'_, '_, '_, H> {
                     simd.splat_f64s(1.0)
                 };
                 append(simd, shape, &mut factor, &mut row, 0, weight);
-                store(simd, shape, &mut factors[(step + 1) * size..][..size], &factor);
+                storage.put(simd, shape, factors, step + 1, &factor);
             }
         }
         true
@@ -309,24 +310,24 @@ impl<H: Dimensions> SpanKernel<'_, '_, '_, H> {
         }
         let vectors = some.len().div_ceil(S::F64_LANES);
         let boundary = group.runs[lane].boundary - group.rows().start;
+        let storages = group.longest().map(|length| FactorStorage::of::<S, H>(shape, length));
+        // Beyond the last window the last is solved again.
+        let mut rows = [before, after].map(|rows| [rows[some.len() - 1]; TOGETHER * MOST_LANES]);
+        rows[0][..some.len()].copy_from_slice(before);
+        rows[1][..some.len()].copy_from_slice(after);
         let mut held = [0.0; TOGETHER * MOST_LANES];
-        for vector in 0..vectors {
-            let (mut of_suffix, mut of_prefix) = ([0; MOST_LANES], [0; MOST_LANES]);
-            for place in 0..S::F64_LANES {
-                // Beyond the last window the last is solved again.
-                let window = (vector * S::F64_LANES + place).min(some.len() - 1);
-                let (before, after) = (before[window] as usize, after[window] as usize);
-                of_suffix[place] = before * size + lane;
-                of_prefix[place] = after * size + lane;
-                let count = if *whole {
-                    before + after
-                } else {
-                    (counts[boundary + after] - counts[boundary - before]) as usize
-                };
-                held[vector * S::F64_LANES + place] = count as f64;
+        for (held, (&before, &after)) in held.iter_mut().zip(rows[0].iter().zip(&rows[1])) {
+            *held = f64::from(before + after);
+        }
+        if !*whole {
+            for (held, (&before, &after)) in held.iter_mut().zip(rows[0].iter().zip(&rows[1])) {
+                *held = f64::from(counts[boundary + after as usize] - counts[boundary - before as usize]);
             }
-            gather(simd, shape, suffixes, &of_suffix, &mut suffix);
-            gather(simd, shape, prefixes, &of_prefix, &mut prefix);
+        }
+        for vector in 0..vectors {
+            let own = |side: usize| &rows[side][vector * S::F64_LANES..(vector + 1) * S::F64_LANES];
+            storages[0].get(simd, shape, suffixes, (lane, own(0)), &mut suffix);
+            storages[1].get(simd, shape, prefixes, (lane, own(1)), &mut prefix);
             merge(simd, shape, &mut suffix, &prefix, &mut row);
             store(simd, shape, &mut windows[vector * size..][..size], &suffix);
         }
@@ -415,28 +416,4 @@ impl<H: Dimensions> SpanKernel<'_, '_, '_, H> {
 /// Vectors of neighbouring windows that are solved together.
 fn together<H: Dimensions>(shape: H) -> usize {
     if shape.size() <= 6 { TOGETHER } else { TOGETHER / 2 }
-}
-
-/// Reads factors whose numbers are one vector apart, from a place for every lane on.
-#[inline(always)]
-fn gather<S: Lanes, H: Dimensions>(
-    simd: S,
-    shape: H,
-    from: &[f64],
-    places: &[usize; MOST_LANES],
-    factor: &mut H::Factor<S::f64s>,
-) {
-    // The last number of each: none of the others needs a check then.
-    let reach = (shape.size() - 1) * S::F64_LANES + 1;
-    let mut own: [&[f64]; MOST_LANES] = [&[]; MOST_LANES];
-    for (own, &place) in own[..S::F64_LANES].iter_mut().zip(places) {
-        *own = &from[place..place + reach];
-    }
-    for number in 0..shape.size() {
-        let mut lanes = [0.0; MOST_LANES];
-        for (lane, own) in lanes[..S::F64_LANES].iter_mut().zip(own) {
-            *lane = own[number * S::F64_LANES];
-        }
-        factor[number] = simd.load(&lanes, 0);
-    }
 }

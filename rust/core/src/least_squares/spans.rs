@@ -9,6 +9,9 @@ use crate::least_squares::row_times::RowTimes;
 use crate::simd::instructions::Instructions;
 use crate::simd::vectors::{Kernel, Lanes, MOST_LANES, dispatch};
 
+/// Times that are compared with the borders of neighbouring windows at a time: where no more lie between these, no branch is foreseen wrongly.
+const LOOKED_AT: usize = 12;
+
 /// One window of a duration for every row: it holds the rows from `begin` after the time of its own row on, up to before `duration` later.
 /// No window begins or ends before the one before it.
 #[derive(Clone, Debug)]
@@ -127,9 +130,14 @@ impl SpanPlaces {
     fn next<S: Lanes>(&mut self, simd: S, spans: &Spans, windows: Range<usize>) -> RowsSpanned {
         let since = &spans.times.since[..];
         let count = S::F64_LANES.min(windows.len());
-        let mut own = [since[windows.start + count - 1]; MOST_LANES];
-        own[..count].copy_from_slice(&since[windows.start..windows.start + count]);
-        let begins = simd.add_f64s(simd.load(&own, 0), simd.splat_f64s(spans.begin));
+        let own = if count == S::F64_LANES {
+            simd.load(since, windows.start)
+        } else {
+            let mut own = [since[windows.start + count - 1]; MOST_LANES];
+            own[..count].copy_from_slice(&since[windows.start..windows.start + count]);
+            simd.load(&own, 0)
+        };
+        let begins = simd.add_f64s(own, simd.splat_f64s(spans.begin));
         let ends = simd.add_f64s(begins, simd.splat_f64s(spans.duration));
         let (first, first_of) = not_before(simd, since, self.first, begins);
         let (end, end_of) = not_before(simd, since, self.end, ends);
@@ -145,22 +153,28 @@ fn not_before<S: Lanes>(simd: S, since: &[f64], from: usize, times: S::f64s) -> 
     simd.store(&mut lanes, 0, times);
     let last = lanes[S::F64_LANES - 1];
     let (one, none) = (simd.splat_u64s(1), simd.splat_u64s(0));
-    let (mut passed, mut place) = (none, from);
-    for &time in &since[from..] {
-        // Times are numbers.
-        if time >= last {
-            break;
+    let (mut passed, mut rest) = (none, &since[from..]);
+    // So many at a time without asking: those that are not before the last are before none.
+    while let Some((some, others)) = rest.split_first_chunk::<LOOKED_AT>() {
+        for &time in some {
+            let is_before = simd.less_than_f64s(simd.splat_f64s(time), times);
+            passed = simd.add_u64s(passed, simd.select_u64s(is_before, one, none));
         }
+        rest = others;
+        if some[LOOKED_AT - 1] >= last {
+            rest = &[];
+        }
+    }
+    for &time in rest {
         let is_before = simd.less_than_f64s(simd.splat_f64s(time), times);
         passed = simd.add_u64s(passed, simd.select_u64s(is_before, one, none));
-        place += 1;
     }
     simd.store(&mut lanes, 0, simd.transmute_f64s_u64s(passed));
     let mut rows = [from; MOST_LANES];
     for (row, passed) in rows[..S::F64_LANES].iter_mut().zip(lanes) {
         *row += usize::try_from(passed.to_bits()).unwrap_or(usize::MAX);
     }
-    (place, rows)
+    (rows[S::F64_LANES - 1], rows)
 }
 
 /// The kernel that finds the runs of windows and how many rows they hold.
@@ -179,30 +193,37 @@ impl Kernel for SpanSurvey<'_> {
         let (mut walk, mut boundary, mut end) = (SpanPlaces::default(), None, 0);
         for window in (0..total).step_by(S::F64_LANES) {
             let rows = walk.next(simd, spans, window..total);
-            let own = window..window + rows.count;
-            let (before, after) = (&mut befores[own.clone()], &mut afters[own]);
-            for lane in 0..rows.count {
+            // In the lanes beyond the last window it stands again.
+            for lane in 0..S::F64_LANES {
                 let held = rows.end[lane] - rows.first[lane];
                 most = most.max(held);
                 fewest = fewest.min(held);
             }
             let mut of = [boundary.unwrap_or(0); MOST_LANES];
             if boundary.is_none_or(|boundary| rows.first[rows.count - 1] > boundary) {
-                for (lane, of) in of.iter_mut().enumerate().take(rows.count) {
+                for lane in 0..rows.count {
                     if boundary.is_none_or(|boundary| rows.first[lane] > boundary) {
                         close(&mut runs, window + lane, end);
                         boundary = Some(rows.end[lane]);
                         let before = rows.end[lane] - rows.first[lane];
                         runs.push(Run { windows: window + lane..total, boundary: rows.end[lane], before, after: 0 });
+                        of[lane..].fill(rows.end[lane]);
                     }
-                    *of = boundary.unwrap_or(0);
                     end = rows.end[lane];
                 }
             }
+            let (mut before, mut after) = ([0; MOST_LANES], [0; MOST_LANES]);
             #[allow(clippy::cast_possible_truncation, reason = "there are no more rows than that")]
-            for lane in 0..rows.count {
+            for lane in 0..S::F64_LANES {
                 before[lane] = (of[lane] - rows.first[lane]) as u32;
                 after[lane] = (rows.end[lane] - of[lane]) as u32;
+            }
+            for (all, some) in [(&mut befores, &before), (&mut afters, &after)] {
+                if rows.count == S::F64_LANES {
+                    all[window..window + S::F64_LANES].copy_from_slice(&some[..S::F64_LANES]);
+                } else {
+                    all[window..].copy_from_slice(&some[..rows.count]);
+                }
             }
             end = rows.end[rows.count - 1];
         }
