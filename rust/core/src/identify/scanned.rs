@@ -153,8 +153,7 @@ impl Scan {
         let is_apart = self.agreement == Agreement::Alike || self.differs(constants, 0.0);
         let plateau = self.plateau.filter(|_| is_apart && self.status(constants) == Status::GOOD)?;
         let from = |scale: &AtScale| -> Vec<f64> {
-            let place = |one: &Constant| self.unknowns.iter().position(|&unknown| unknown == one.unknown);
-            let off = |one: &Constant| place(one).map_or(0.0, |place| scale.values[place] - one.value);
+            let off = |one: &Constant| self.place(one.unknown).map_or(0.0, |place| scale.values[place] - one.value);
             constants.iter().map(off).collect()
         };
         let beyond = |off: &Vec<f64>| -> f64 {
@@ -165,11 +164,16 @@ impl Scan {
         Some(std::iter::repeat_n(0.0, slow).chain(most).collect())
     }
 
+    /// Where an unknown is among those that were compared.
+    fn place(&self, unknown: usize) -> Option<usize> {
+        self.unknowns.iter().position(|&one| one == unknown)
+    }
+
     /// Whether widths disagree, or the constant of an unknown is not theirs, beyond so many of their errors.
     fn is_beside(&self, constants: &[(usize, f64)], errors: f64) -> bool {
         let Some(one) = self.narrowest().filter(|_| !self.has_no_plateau()) else { return true };
         let off = |&(unknown, value): &(usize, f64)| {
-            let place = self.unknowns.iter().position(|&one| one == unknown);
+            let place = self.place(unknown);
             place.is_some_and(|place| (one.values[place] - value).abs() > errors * one.errors[place])
         };
         self.agreement != Agreement::WithinErrors || constants.iter().any(off)
@@ -191,7 +195,7 @@ impl Scan {
     }
 
     fn differs_at(&self, scale: &AtScale, constant: &Constant, part: f64) -> bool {
-        let Some(place) = self.unknowns.iter().position(|&one| one == constant.unknown) else { return false };
+        let Some(place) = self.place(constant.unknown) else { return false };
         let error = scale.errors[place].hypot(constant.error);
         let most = (OTHER_CONSTANT * error).max(part * constant.value.abs());
         (scale.values[place] - constant.value).abs() > most

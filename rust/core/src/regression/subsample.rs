@@ -82,6 +82,28 @@ pub(crate) fn places_of(stretches: &[Range<usize>]) -> Vec<Range<usize>> {
     places.collect()
 }
 
+/// Which of the rows in stretches, one after another, a row of the record is, if it is one of them.
+pub(crate) fn place_among(stretches: &[Range<usize>], row: usize) -> Option<usize> {
+    let mut before = 0;
+    for stretch in stretches {
+        if stretch.contains(&row) {
+            return Some(before + row - stretch.start);
+        }
+        before += stretch.len();
+    }
+    None
+}
+
+/// Ranges that end before some places within them, in ascending order, and begin again there.
+pub(crate) fn cut(ranges: &[Range<usize>], places: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
+    let mut ends: Vec<usize> = ranges.iter().map(|range| range.end).chain(places).collect();
+    ends.sort_unstable();
+    ends.dedup();
+    let begin = ranges.first().map_or(0, |range| range.start);
+    let starts = std::iter::once(begin).chain(ends.iter().copied());
+    starts.zip(&ends).map(|(start, &end)| start..end).filter(|range| !range.is_empty()).collect()
+}
+
 /// More of them, for tests of constants beside which nothing is windowed: so much less is estimated from each row.
 pub(crate) fn more_stretches_of_rows(rows: usize) -> Option<Vec<Range<usize>>> {
     (rows > MORE * LONG).then(|| stretches_of_blocks(rows, MORE * MOST_ROWS, STRETCHES))
@@ -110,5 +132,19 @@ mod tests {
             assert!(places.windows(2).all(|pair| pair[0].end == pair[1].start));
             assert!(2 * scales[held - 1].span() <= few[0].len() && 2 * scales[held].span() > few[0].len());
         }
+    }
+
+    #[test]
+    fn stretches_are_cut_where_something_jumps_and_rows_between_them_are_none() {
+        let stretches = [10..30, 40..50];
+        assert_eq!(
+            [9, 10, 29, 30, 39, 40, 49].map(|row| place_among(&stretches, row)),
+            [None, Some(0), Some(19), None, None, Some(20), Some(29)]
+        );
+        let places = || places_of(&stretches);
+        assert_eq!(places(), [0..20, 20..30]);
+        assert_eq!(cut(&places(), [5, 25].into_iter()), [0..5, 5..20, 20..25, 25..30]);
+        assert_eq!(cut(&places(), [0, 20, 30].into_iter()), [0..20, 20..30]);
+        assert_eq!(cut(&places(), std::iter::empty()), [0..20, 20..30]);
     }
 }

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::MergedSession;
 use crate::identify::merged::system::Multiplied;
-use crate::inference::jumps::jump::{Jump, JumpSearch};
+use crate::inference::jumps::jump::{Jump, JumpSearch, row_from};
 use crate::inference::jumps::search::rows_over;
 use crate::record::samples::{Samples, read_around};
 use crate::regression::limits::NOISE_MODEL_FAILS;
@@ -27,18 +27,20 @@ impl MergedSession<'_, '_, '_> {
             return None;
         }
         let whole = self.all.rows.clone();
-        let (first, stride, group) = (self.all.function.half_width(), self.all.function.stride(), self.all.group);
         let function = &self.all.kernels.values[STIFFNESS];
-        self.all.rows.exclude(rows_over(&self.jumps, function, (first, stride, group), whole.len()));
+        self.all.rows.exclude(rows_over(&self.jumps, function, self.times(), whole.len()));
         self.all.rows.jumps = self.rows_of_jumps();
         Some(whole)
     }
 
     /// The rows that jumps lie before.
     fn rows_of_jumps(&self) -> Vec<usize> {
-        let (first, stride, group) = (self.all.function.half_width(), self.all.function.stride(), self.all.group);
-        let row = |jump: &Jump| jump.sample.saturating_sub(first).div_ceil(stride) * group;
-        self.jumps.iter().map(row).collect()
+        self.jumps.iter().map(|jump| row_from(jump.sample, self.times())).collect()
+    }
+
+    /// The sample of the first time, samples from one to the next, and the rows of each.
+    fn times(&self) -> (usize, usize, usize) {
+        (self.all.function.half_width(), self.all.function.stride(), self.all.group)
     }
 
     /// Lengths of windows that parts between jumps hold, short parts but for: what no window holds is not predicted, and speaks against no length.

@@ -9,7 +9,7 @@ use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
 use crate::inference::constancy::{self, NoiseFrom, TestNoise, Trend};
-use crate::inference::jumps::jump::Jump;
+use crate::inference::jumps::jump::{Jump, row_from};
 use crate::inference::jumps::search;
 use crate::inference::missing_terms::JudgedTerm;
 use crate::inference::slowly_varying;
@@ -77,9 +77,9 @@ impl Session<'_, '_, '_> {
             let weak = &mut chosen.weak;
             let whole = whole.get_or_insert_with(|| weak.rows.clone());
             weak.rows = whole.clone();
-            let (function, rows) = (&weak.kernels.values[2], weak.rows.len());
-            weak.rows.exclude(search::rows_over(&found, function, (weak.first, weak.stride, 1), rows));
-            weak.rows.jumps = found.iter().map(|jump| (jump.sample - weak.first).div_ceil(weak.stride)).collect();
+            let (function, rows, times) = (&weak.kernels.values[2], weak.rows.len(), (weak.first, weak.stride, 1));
+            weak.rows.exclude(search::rows_over(&found, function, times, rows));
+            weak.rows.jumps = found.iter().map(|jump| row_from(jump.sample, times)).collect();
             (jumps, round) = (found, round + 1);
         }
     }

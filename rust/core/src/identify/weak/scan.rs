@@ -10,10 +10,10 @@ use crate::identify::weak::decide::{BADLY, BETTER};
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
 use crate::identify::widths::{MOST_SAMPLES, OfWidth, STRETCHES, Widths};
-use crate::inference::jumps::jump::Jump;
+use crate::inference::jumps::jump::{Jump, row_from};
 use crate::inference::jumps::search::rows_over;
 use crate::regression::model::Model;
-use crate::regression::subsample::{places_of, stretches_of_blocks};
+use crate::regression::subsample::{cut, place_among, places_of, stretches_of_blocks};
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 use crate::weak_form::test_function_choice::spectrum_length;
 use crate::weak_form::weak_rows::WeakRows;
@@ -190,54 +190,11 @@ impl Session<'_, '_, '_> {
         let stretches = stretches.unwrap_or_else(|| std::iter::once(0..count).collect());
         let mut places = places_of(&stretches);
         if !jumps.is_empty() {
-            let among = |row: usize| among(&stretches, row);
-            let (first, stride) = (weak.first, weak.stride);
-            let over = rows_over(jumps, &weak.kernels.values[2], (first, stride, 1), count);
+            let (times, among) = ((weak.first, weak.stride, 1), |row: usize| place_among(&stretches, row));
+            let over = rows_over(jumps, &weak.kernels.values[2], times, count);
             weak.rows.exclude(over.filter_map(among));
-            let cuts = jumps.iter().map(|jump| jump.sample.saturating_sub(first).div_ceil(stride));
-            places = cut(&places, cuts.filter_map(among));
+            places = cut(&places, jumps.iter().filter_map(|jump| among(row_from(jump.sample, times))));
         }
         Ok((weak, places))
-    }
-}
-
-/// Which of the rows in stretches, one after another, a row of the record is.
-fn among(stretches: &[Range<usize>], row: usize) -> Option<usize> {
-    let mut before = 0;
-    for stretch in stretches {
-        if stretch.contains(&row) {
-            return Some(before + row - stretch.start);
-        }
-        before += stretch.len();
-    }
-    None
-}
-
-/// Ranges that end before some places within them, in ascending order, and begin again there.
-fn cut(ranges: &[Range<usize>], places: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
-    let mut ends: Vec<usize> = ranges.iter().map(|range| range.end).chain(places).collect();
-    ends.sort_unstable();
-    ends.dedup();
-    let begin = ranges.first().map_or(0, |range| range.start);
-    let starts = std::iter::once(begin).chain(ends.iter().copied());
-    starts.zip(&ends).map(|(start, &end)| start..end).filter(|range| !range.is_empty()).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn stretches_are_cut_where_something_jumps_and_rows_between_them_are_none() {
-        let stretches = [10..30, 40..50];
-        assert_eq!(
-            [9, 10, 29, 30, 39, 40, 49].map(|row| among(&stretches, row)),
-            [None, Some(0), Some(19), None, None, Some(20), Some(29)]
-        );
-        let places = || places_of(&stretches);
-        assert_eq!(places(), [0..20, 20..30]);
-        assert_eq!(cut(&places(), [5, 25].into_iter()), [0..5, 5..20, 20..25, 25..30]);
-        assert_eq!(cut(&places(), [0, 20, 30].into_iter()), [0..20, 20..30]);
-        assert_eq!(cut(&places(), std::iter::empty()), [0..20, 20..30]);
     }
 }

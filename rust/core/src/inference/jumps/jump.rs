@@ -49,8 +49,13 @@ pub(crate) struct JumpSearch<'a> {
 impl JumpSearch<'_> {
     /// The first row of the times from a sample on.
     pub(crate) fn row_from(&self, sample: usize) -> usize {
-        sample.saturating_sub(self.first).div_ceil(self.stride) * self.group
+        row_from(sample, (self.first, self.stride, self.group))
     }
+}
+
+/// The first row of the times from a sample on: the first time is a sample, the next is so many samples later, and so many rows belong to each.
+pub(crate) fn row_from(sample: usize, (first, stride, group): (usize, usize, usize)) -> usize {
+    sample.saturating_sub(first).div_ceil(stride) * group
 }
 
 /// A line for every windowed coefficient: value at a row and growth per row.

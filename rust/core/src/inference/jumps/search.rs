@@ -18,7 +18,7 @@ use std::ops::Range;
 use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
-use crate::inference::jumps::jump::{Jump, JumpSearch, Lines, UNLIKELY};
+use crate::inference::jumps::jump::{Jump, JumpSearch, Lines, UNLIKELY, row_from};
 use crate::inference::jumps::placement::JumpPlace;
 use crate::inference::jumps::shared_windows::SharedWindows;
 use crate::inference::windows_around::Around;
@@ -261,7 +261,7 @@ fn around<'a>(solved: &'a [(Scale, Cow<'_, Cells>)]) -> Vec<Around<'a>> {
 pub(crate) fn rows_over(
     jumps: &[Jump],
     function: &[f64],
-    (first, stride, group): (usize, usize, usize),
+    times: (usize, usize, usize),
     rows: usize,
 ) -> impl Iterator<Item = usize> {
     let mut beyond = 0.0;
@@ -275,7 +275,7 @@ pub(crate) fn rows_over(
         .map(|jump| {
             let place = |part: f64| jump.first + jump.happened.partition_point(|&happened| happened < part);
             let (early, late) = (place(UNLIKELY).min(jump.sample), place(1.0 - UNLIKELY).max(jump.sample));
-            let row = |sample: usize| (sample.saturating_sub(first).div_ceil(stride) * group).min(rows);
+            let row = |sample: usize| row_from(sample, times).min(rows);
             row(early.saturating_sub(reach))..row(late + reach)
         })
         .collect();
