@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::exec::huge_pages::zeros;
-use crate::record::samples::Samples;
+use crate::record::samples::{Samples, all_usable};
 use crate::simd::instructions::Instructions;
 use crate::simd::vectors::{Kernel, Lanes, MOST_LANES, dispatch};
 
@@ -119,7 +119,7 @@ impl Kernel for Look<'_> {
         let numbers = simd.load(&numbers, 0);
         // The time before a piece comes first.
         let mut piece = [0.0; PIECE + 1];
-        let mut worst = f64::INFINITY;
+        let mut are_numbers = true;
         for first in (0..count).step_by(PIECE) {
             let len = PIECE.min(count - first);
             times.read(first, &mut piece[1..=len]);
@@ -150,17 +150,15 @@ impl Kernel for Look<'_> {
             }
             piece[0] = piece[len];
             // What is no number compares as nothing: looked for where it would be lost.
-            if !crate::record::samples::all_usable(&since[first..first + len]) {
-                worst = f64::NAN;
-            }
+            are_numbers &= all_usable(&since[first..first + len]);
         }
         let mut lanes = [[0.0; MOST_LANES]; 4];
         let found = [seen.shortest, seen.longest, seen.farthest, seen.largest];
         lanes.iter_mut().zip(found).for_each(|(lanes, found)| simd.store(lanes, 0, found));
         let most = |of: usize| lanes[of][..S::F64_LANES].iter().copied().fold(0.0, f64::max);
-        let shortest = lanes[0][..S::F64_LANES].iter().copied().fold(worst, f64::min);
+        let shortest = lanes[0][..S::F64_LANES].iter().copied().fold(f64::INFINITY, f64::min);
         TimesShown {
-            shortest: if worst.is_nan() { f64::NAN } else { shortest },
+            shortest: if are_numbers { shortest } else { f64::NAN },
             longest: most(1),
             farthest: most(2),
             largest: most(3),

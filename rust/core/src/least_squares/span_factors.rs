@@ -6,6 +6,12 @@ use crate::simd::vectors::{Lanes, MOST_LANES};
 /// Factors of so many numbers are turned when they are made: each then lies in a few cache lines, and not each number in its own.
 const TURNED_FROM: usize = 12;
 
+/// Whether the numbers of a factor lie side by side. Otherwise those of all lanes do, and small factors are read number by number.
+#[inline(always)]
+fn is_turned(shape: impl Dimensions) -> bool {
+    shape.size() >= TURNED_FROM
+}
+
 /// Where the factors of no rows, one, two … of every lane lie in memory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FactorStorage {
@@ -20,19 +26,13 @@ impl FactorStorage {
     /// For factors of up to so many rows.
     #[inline(always)]
     pub(crate) fn of<S: Lanes, H: Dimensions>(shape: H, length: usize) -> Self {
-        if Self::is_turned::<S, H>(shape) {
+        if is_turned(shape) {
             let step = shape.size().next_multiple_of(S::F64_LANES);
             Self { apart: (length + 1) * step, step, numbers: S::F64_LANES * (length + 1) * step }
         } else {
             let step = shape.size() * S::F64_LANES;
             Self { apart: 1, step, numbers: (length + 1) * step }
         }
-    }
-
-    /// Whether the numbers of a factor lie side by side. Otherwise those of all lanes do, and small factors are read number by number.
-    #[inline(always)]
-    fn is_turned<S: Lanes, H: Dimensions>(shape: H) -> bool {
-        shape.size() >= TURNED_FROM
     }
 
     /// Writes the factors of so many rows.
@@ -45,7 +45,7 @@ impl FactorStorage {
         rows: usize,
         factor: &H::Factor<S::f64s>,
     ) {
-        if !Self::is_turned::<S, H>(shape) {
+        if !is_turned(shape) {
             store(simd, shape, &mut into[rows * self.step..], factor);
             return;
         }
@@ -72,7 +72,7 @@ impl FactorStorage {
         factor: &mut H::Factor<S::f64s>,
     ) {
         let from = &from[lane * self.apart..];
-        if Self::is_turned::<S, H>(shape) {
+        if is_turned(shape) {
             let mut square = [simd.splat_f64s(0.0); MOST_LANES];
             for first in (0..shape.size()).step_by(S::F64_LANES) {
                 for (numbers, &rows) in square[..S::F64_LANES].iter_mut().zip(rows) {

@@ -316,13 +316,13 @@ impl<H: Dimensions> SpanKernel<'_, '_, '_, H> {
         rows[0][..some.len()].copy_from_slice(before);
         rows[1][..some.len()].copy_from_slice(after);
         let mut held = [0.0; TOGETHER * MOST_LANES];
-        for (held, (&before, &after)) in held.iter_mut().zip(rows[0].iter().zip(&rows[1])) {
-            *held = f64::from(before + after);
-        }
-        if !*whole {
-            for (held, (&before, &after)) in held.iter_mut().zip(rows[0].iter().zip(&rows[1])) {
+        let sides = held.iter_mut().zip(rows[0].iter().zip(&rows[1]));
+        if *whole {
+            sides.for_each(|(held, (&before, &after))| *held = f64::from(before + after));
+        } else {
+            sides.for_each(|(held, (&before, &after))| {
                 *held = f64::from(counts[boundary + after as usize] - counts[boundary - before as usize]);
-            }
+            });
         }
         for vector in 0..vectors {
             let own = |side: usize| &rows[side][vector * S::F64_LANES..(vector + 1) * S::F64_LANES];
