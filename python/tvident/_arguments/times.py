@@ -25,8 +25,8 @@ _LONGEST = 1e30
 # How far a time stamp may lie from a uniform grid, as a fraction of the sample period.
 _JITTER = 1e-3
 
-_ROUNDING = 4 * float(np.finfo(np.float64).eps)
-"""How much a double may be rounded on its way, as a part of the largest."""
+_ROUNDINGS = 4
+"""How often times may be rounded on their way."""
 
 _FEW_TIMES = 100
 """Times of which a step is asked first: they deny most steps."""
@@ -179,10 +179,11 @@ def period_of_times(t: npt.ArrayLike, samples: int) -> float:
         )
     if samples == 1:
         return 1.0
-    rounding = 4 * float(np.spacing(np.ones(1, given.dtype if given.dtype.kind == "f" else np.float64))[0])
+    kind = given.dtype if given.dtype.kind == "f" else np.dtype(np.float64)
     seconds = given.astype(np.float64, copy=False)
+    size = np.abs(seconds)
     # Differences of times that are larger by far leave the range of doubles.
-    bad = ~(np.abs(seconds) < _COUNTABLE * _LONGEST)
+    bad = ~(size < _COUNTABLE * _LONGEST)
     if bad.any():
         place = int(np.flatnonzero(bad)[0])
         raise ValueError(f"t must hold finite times; t[{place}] is {seconds[place]}; repair it")
@@ -190,11 +191,11 @@ def period_of_times(t: npt.ArrayLike, samples: int) -> float:
     if not period > 0:
         raise _not_increasing(seconds)
     distance = np.abs(seconds - (seconds[0] + period * np.arange(samples)))
-    if float(distance.max()) <= max(_JITTER * period, rounding * float(np.max(np.abs(seconds)))):
+    largest = float(size.max())
+    if float(distance.max()) <= max(_JITTER * period, _rounding(kind) * largest):
         return period
-    kind = given.dtype if given.dtype.kind == "f" else np.dtype(np.float64)
-    slack = float(np.spacing(np.abs(seconds).max().astype(kind)))
-    quantum, bounds = _printed(seconds, period, slack)
+    slack = float(np.spacing(size.max().astype(kind)))
+    quantum, bounds = _printed(seconds, period, slack, largest)
     # Times that most samples share may be of any rate.
     if quantum is None or bounds is None or not bounds[0] > 0:
         raise _not_uniform(seconds, distance, period)
@@ -281,7 +282,7 @@ def certainly_irregular(seconds: Seconds, seen: _core.RowTimes) -> bool:
     largest = seen.largest()
     if seconds.size < 3 or not seen.increase() or not largest < _COUNTABLE * _LONGEST:  # noqa: PLR2004 - one step is uniform
         return False
-    allowed = max(_JITTER * seen.length() / (seconds.size - 1), _ROUNDING * largest)
+    allowed = max(_JITTER * seen.length() / (seconds.size - 1), _rounding(seconds.dtype) * largest)
     # Twice what is allowed: here distances are rounded in another way.
     if not seen.farthest() > 2 * allowed:
         return False
@@ -289,6 +290,11 @@ def certainly_irregular(seconds: Seconds, seen: _core.RowTimes) -> bool:
     last = seconds[-_FEW_TIMES:] if abs(seconds[-1]) >= abs(seconds[0]) else seconds[:_FEW_TIMES]
     slack = float(np.spacing(largest))
     return all(_quantum(some, slack, largest) is None for some in (last, seconds))
+
+
+def _rounding(kind: np.dtype[Any]) -> float:
+    """Return how much times of a type may be rounded on their way, as a part of the largest."""
+    return _ROUNDINGS * float(np.spacing(np.ones(1, kind))[0])
 
 
 def _quantum(seconds: Seconds, slack: float, largest: float) -> float | None:
@@ -308,16 +314,16 @@ def _quantum(seconds: Seconds, slack: float, largest: float) -> float | None:
     return None
 
 
-def _printed(seconds: Seconds, period: float, slack: float) -> tuple[float | None, tuple[float, float] | None]:
+def _printed(
+    seconds: Seconds, period: float, slack: float, largest: float
+) -> tuple[float | None, tuple[float, float] | None]:
     """Return the decimal step that times were printed in, and the shortest and the longest period that they may have."""
-    largest = float(np.abs(seconds).max())
     quantum = _quantum(seconds, slack, largest)
     bounds = None if quantum is None else _periods(seconds, period, (1 + _SEARCHED) * quantum + 4 * slack)
     if bounds is not None:
         return quantum, bounds
     # Printed with so many digits from the first on, as %.6g does, the largest have the fewest behind the point.
-    size = np.abs(seconds)
-    last = seconds[size >= 10.0 ** np.floor(np.log10(largest))]
+    last = seconds[np.abs(seconds) >= 10.0 ** np.floor(np.log10(largest))]
     coarse = _quantum(last, slack, largest) if last.size >= _FEW_TIMES else None
     # A coarser one might hide that a sample is lost where times are small.
     if coarse is None or coarse > _FINE * period:

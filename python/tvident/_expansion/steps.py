@@ -33,18 +33,15 @@ def variance_of_steps(basis: Basis, factors: Array, root: Array, places: Sequenc
 def _change(basis: Basis, factors: Array, root: Array, places: Sequence[Array], number: int, width: float) -> Array:
     """Return the change of a curve within the cells of one of its coordinates."""
     own = basis.at(places)
-    sides = []
+    changes, noises = [], []
     for shift in (-width, width):
         moved = places[number] + shift
         is_inside = (moved >= 0) & (moved <= 1)
-        beside = basis.at([moved.clip(0, 1) if one == number else place for one, place in enumerate(places)])
-        change = np.sign(shift) * ((beside - own) @ factors)
-        noise = (((beside - own) @ root) ** 2).sum(axis=1)
-        sides.append(np.where(is_inside, change, np.nan))
-        sides.append(np.where(is_inside, noise, np.nan))
-    before, _, behind, _ = sides
-    before, behind = (np.where(np.isnan(one), other, one) for one, other in ((before, behind), (behind, before)))
+        beside = basis.at([moved.clip(0, 1) if one == number else place for one, place in enumerate(places)]) - own
+        changes.append(np.where(is_inside, np.sign(shift) * (beside @ factors), np.nan))
+        noises.append(np.where(is_inside, ((beside @ root) ** 2).sum(axis=1), np.nan))
+    # Beyond the first and the last cell there is none: the change on the other side stands for both.
+    before, behind = (np.where(np.isnan(one), other, one) for one, other in (changes, changes[::-1]))
     smaller = np.where(np.abs(before) < np.abs(behind), before, behind)
-    noise = np.nanmean(sides[1::2], axis=0)
-    square = np.where(before * behind > 0, smaller**2, 0.0) - noise
+    square = np.where(before * behind > 0, smaller**2, 0.0) - np.nanmean(noises, axis=0)
     return np.asarray(np.sqrt(np.maximum(square, 0.0)))

@@ -15,8 +15,9 @@ from tvident._files.names import printable
 from tvident._files.unpacked import ending_of
 from tvident._formats import FORMATS
 
-TEXT, NUMPY = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm", ".mot", ".sto"), (".npy", ".npz")
-PACKED = (".csv.gz", ".txt.gz", ".tsv.gz", ".dat.gz", ".asc.gz")
+PLAIN = (".csv", ".txt", ".tsv", ".dat", ".asc")
+TEXT, NUMPY = (*PLAIN, ".lvm", ".mot", ".sto"), (".npy", ".npz")
+PACKED = tuple(f"{ending}.gz" for ending in PLAIN)
 ARROW = (".parquet", ".feather", ".arrow")
 """Endings of files that can be read."""
 

@@ -11,11 +11,10 @@ from pathlib import Path
 from tvident._files.cells import decimal_sign, number
 from tvident._files.channels import FileError
 from tvident._files.names import printable
+from tvident._files.recordings import PACKED, PLAIN
 from tvident._files.text import read_start
 from tvident._files.unpacked import ending_of
 from tvident._units import UnitError, factor_between
-
-_TEXTS = {".csv", ".txt", ".tsv", ".dat", ".asc"}
 
 _SEARCHED = 100
 """Lines that are looked at."""
@@ -45,7 +44,7 @@ class StatedRate:
 
 def stated_rate(path: Path) -> StatedRate | None:
     """Return the sample rate that lines above the numbers of a text state; None where none does, or several differ."""
-    if ending_of(path).lower().removesuffix(".gz") not in _TEXTS:
+    if ending_of(path).lower() not in (*PLAIN, *PACKED):
         return None
     try:
         lines = read_start(path).split("\n")[:_SEARCHED]
