@@ -178,3 +178,27 @@ def test_no_filter_is_said_of_what_was_not_filtered(pattern: Pattern, seed: int)
         (angle, rubbing),
     ):
         assert not tvident.identify(one, other, sample_rate=RATE).record_status & Status.CHANNEL_SUSPECTED
+
+
+LEAST_WIDTH = 40
+"""Samples of a test function whose band ends where both channels of the rig show the same motion, 23 Hz: 45 with an exponent of 9."""
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("seed", [11, *long(12, 13, 14)])
+@pytest.mark.parametrize("pattern", ["slider", "constant"])
+@pytest.mark.parametrize(("cutoff", "order", "both"), [(20.0, 2, False), (50.0, 2, False), (50.0, 1, True)])
+def test_noise_that_was_low_passed_is_not_taken_for_motion(
+    cutoff: float, order: int, both: bool, pattern: Pattern, seed: int
+) -> None:
+    """It made test functions of 9 to 47 samples seem best, and windows as short, in which nothing is known."""
+    recording = tvident.simulate_torsional_rig(seed=seed, pattern=pattern, angle_noise=1e-3)
+    kernels = butter(order, cutoff, fs=RATE)
+    torque = lfilter(*kernels, recording.torque) if both else recording.torque
+    result = tvident.identify(lfilter(*kernels, recording.angle), torque, sample_rate=RATE)
+    assert result.settings["window_length"] > LEAST_WIDTH
+    assert not result.record_status & Status.WINDOW_LIMIT
+    if both:
+        assert abs(result.value("inertia").value / np.mean(recording.inertia) - 1) < HELD
+    else:
+        assert result.record_status & Status.LAG_SUSPECTED

@@ -38,12 +38,21 @@ const LATER: f64 = 4.0;
 const STEPS: i32 = 16;
 
 /// Sums of the spectra of two channels.
-struct Spectra {
-    length: usize,
+pub(crate) struct Spectra {
+    pub(crate) length: usize,
     angle: Vec<f64>,
     torque: Vec<f64>,
     both: Vec<[f64; 2]>,
-    segments: usize,
+    pub(crate) segments: usize,
+}
+
+impl Spectra {
+    /// The coherence of the channels at a frequency; zero where one of them has nothing.
+    pub(crate) fn coherence(&self, frequency: usize) -> f64 {
+        let [real, imaginary] = self.both[frequency];
+        let powers = self.angle[frequency] * self.torque[frequency];
+        if powers > 0.0 { (real * real + imaginary * imaginary) / powers } else { 0.0 }
+    }
 }
 
 /// The mean coherence of angle and torque above the motion, less its bias; `None` if the record has no such band, is too short, or shows motion
@@ -84,16 +93,13 @@ pub fn noise_coherence(
         return None;
     }
     let frequencies = band.len() as f64;
-    let coherence = band.map(|frequency| {
-        let [real, imaginary] = spectra.both[frequency];
-        let powers = spectra.angle[frequency] * spectra.torque[frequency];
-        if powers > 0.0 { (real * real + imaginary * imaginary) / powers } else { 0.0 }
-    });
+    let coherence = band.map(|frequency| spectra.coherence(frequency));
     let bias = 1.0 / count;
     Some(((coherence.sum::<f64>() / frequencies - bias) / (1.0 - bias)).max(0.0))
 }
 
-fn spectra(angle: &dyn Samples, torque: &dyn Samples) -> Option<Spectra> {
+/// Spectra of two channels, or `None` if there are too few segments in which every sample of both is usable.
+pub(crate) fn spectra(angle: &dyn Samples, torque: &dyn Samples) -> Option<Spectra> {
     let samples = angle.len().min(torque.len());
     let is_long = 2 * samples >= (FEWEST + 1) * SEGMENT;
     let length = if is_long { SEGMENT } else { SHORT_SEGMENT };

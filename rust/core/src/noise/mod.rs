@@ -12,6 +12,7 @@ pub(crate) mod low_passed;
 pub(crate) mod median;
 pub(crate) mod passed;
 pub(crate) mod quantisation;
+pub(crate) mod shared_band;
 pub(crate) mod spectrum;
 pub(crate) mod spikes;
 pub(crate) mod transform;

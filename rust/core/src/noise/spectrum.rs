@@ -26,7 +26,15 @@ pub(crate) fn power(record: &dyn Samples, length: usize) -> Vec<f64> {
     Segments::new(record, None, length).power().0
 }
 
-/// The same from segments without unusable samples only, and their number: a line that bridges samples has no noise. Segments are
+/// The same from segments that fade in and out more smoothly: a strong motion at low frequencies leaks less into the highest.
+pub(crate) fn power_with_little_leakage(record: &dyn Samples, length: usize) -> Vec<f64> {
+    let mut segments = Segments::new(record, None, length);
+    segments.fade.iter_mut().for_each(|factor| *factor *= *factor);
+    segments.energy = segments.fade.iter().map(|factor| factor * factor).sum();
+    segments.power().0
+}
+
+/// The power from segments without unusable samples only, and their number: a line that bridges samples has no noise. Segments are
 /// multiplied by their weight where samples have weights: noise is then that of a sample of weight one.
 pub(crate) fn power_of_whole_segments(
     record: &dyn Samples,

@@ -45,6 +45,11 @@ pub struct Kernels {
     pub slopes: [Vec<f64>; 3],
 }
 
+/// Cycles in a half-width of the frequency of which half the power passes.
+fn half_power(exponent: usize) -> f64 {
+    (2.0 * exponent as f64 * std::f64::consts::LN_2).sqrt() / (2.0 * std::f64::consts::PI)
+}
+
 impl TestFunction {
     /// `(1 - x²)^exponent` on `2 half_width + 1` samples that are `delta` seconds apart.
     ///
@@ -89,8 +94,14 @@ impl TestFunction {
     /// Where half the power passes, in hertz: the function is nearly a bell, `(1 - x²)^p ≈ exp(-p x²)`.
     #[must_use]
     pub fn band(&self) -> f64 {
-        let seconds = self.half_width as f64 * self.delta;
-        (2.0 * self.exponent as f64 * std::f64::consts::LN_2).sqrt() / (2.0 * std::f64::consts::PI * seconds)
+        half_power(self.exponent) / (self.half_width as f64 * self.delta)
+    }
+
+    /// The smallest half-width whose band ends at so many cycles per sample or below.
+    pub(crate) fn half_width_of(band: f64, exponent: usize) -> usize {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some multiple of a cycle")]
+        let half_width = (half_power(exponent) / band).ceil() as usize;
+        half_width
     }
 
     /// Samples from one row to the next that carry all the information of every row: a sixth of the half-width in whole samples, and one more where more
@@ -177,6 +188,15 @@ mod tests {
             kernel.iter().enumerate().map(|(place, value)| value * part(turn(place))).sum::<f64>()
         };
         sum(f64::cos).powi(2) + sum(f64::sin).powi(2)
+    }
+
+    #[test]
+    fn the_smallest_half_width_of_a_band_ends_there() {
+        for (band, exponent) in [(0.02, 9), (0.05, 5)] {
+            let half = TestFunction::half_width_of(band, exponent);
+            let [wider, narrower] = [half, half - 1].map(|half| TestFunction::new(half, exponent, 1.0).unwrap().band());
+            assert!(wider <= band && band < narrower, "{wider} {narrower}");
+        }
     }
 
     #[test]

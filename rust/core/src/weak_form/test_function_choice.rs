@@ -59,6 +59,18 @@ impl Evidence {
         self
     }
 
+    /// The evidence of an angle that shows motion up to a frequency, in cycles per sample, and nothing but noise above: as much noise below as just there.
+    pub(crate) fn with_motion_until(mut self, frequency: f64) -> Self {
+        let length = 2 * (self.power.len() - 1);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the bins")]
+        let first = ((frequency * length as f64).ceil() as usize).clamp(1, self.power.len() - 1);
+        let above = &self.power[first..(first + first.div_ceil(4)).min(self.power.len())];
+        let level = (above.iter().sum::<f64>() / above.len() as f64).max(self.noise[0]);
+        let below = self.power[..first].iter().map(|&power| level.min(power));
+        self.coloured = Some(below.chain(self.power[first..].iter().copied()).collect());
+        self
+    }
+
     /// Samples in a typical cycle of the signal, by the mean frequency of its velocity.
     pub(crate) fn period(&self) -> f64 {
         let length = 2 * (self.power.len() - 1);
@@ -237,5 +249,31 @@ impl Tried {
         let factor = errors.L();
         // Half the rows double every variance; without rows the sum is infinite.
         (0..size).map(|i| factor[(i, i)].ln() + scale[i].ln() - 0.5 * self.share.ln()).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_above_the_motion_is_noise_and_as_much_of_it_is_below() {
+        let power: Vec<f64> = (0..=64).map(|bin| if bin < 16 { 100.0 } else { 64.0 / f64::from(bin) }).collect();
+        let evidence = Evidence {
+            power: power.clone(),
+            samples: 1000,
+            noise: [1e-9, 1.0],
+            coloured: None,
+            delta: 1.0,
+            unknown: [true; 3],
+        };
+        let told = evidence.clone().with_motion_until(16.0 / 128.0);
+        let noise = told.coloured.clone().unwrap();
+        assert_eq!(noise[16..], power[16..]);
+        let level = (16..20).map(|bin| power[bin]).sum::<f64>() / 4.0;
+        assert!(noise[..16].iter().all(|noise| (noise / level - 1.0).abs() < 1e-12));
+        // Of a band that ends at 1/8 the mean frequency of velocities is 3/4 of that.
+        assert!((told.period() / (8.0 * 4.0 / 3.0) - 1.0).abs() < 0.1, "{}", told.period());
+        assert!(evidence.period() < 8.0);
     }
 }

@@ -23,6 +23,9 @@ const PILOT_WINDOW: usize = 4;
 const PILOT_SAMPLES: usize = 1 << 16;
 const PILOT_STRETCHES: usize = 8;
 const PILOT_WIDTHS: usize = 64;
+/// The test function for a typical cycle of the motion: its exponent, and the part of the cycle that is its half-width where nothing narrower is needed.
+pub(crate) const EXPONENT: usize = 9;
+const PART_OF_A_CYCLE: usize = 8;
 /// Rounds of choosing the test function and estimating what the choice depends on.
 const ROUNDS: usize = 6;
 /// Rows with the test function that was chosen.
@@ -85,7 +88,21 @@ impl Session<'_, '_, '_> {
             delta: self.options.delta,
             unknown: std::array::from_fn(|index| matches!(self.record.coefficients[index], Coefficient::Unknown)),
         };
-        Ok(evidence.with_noise(self.record.noise))
+        Ok(match self.shared_until {
+            Some(until) => evidence.with_motion_until(until),
+            None => evidence.with_noise(self.record.noise),
+        })
+    }
+
+    /// The half-width of the narrowest test function that is tried, beside a typical cycle of the motion in samples.
+    ///
+    /// What the angle shows above the corner of a low-pass filter looks like motion, since its noise cannot be read there, and makes narrow test
+    /// functions seem best. Where either channel was low-passed their band ends with that in which both show the same motion, but not below what
+    /// a part of a typical cycle needs.
+    fn narrowest(&self, typical: usize) -> usize {
+        let Some(until) = self.shared_until else { return LEAST_HALF_WIDTH };
+        let half = TestFunction::half_width_of(until, self.options.exponent.unwrap_or(EXPONENT));
+        half.min(typical / PART_OF_A_CYCLE).max(LEAST_HALF_WIDTH)
     }
 
     /// Chooses half-width and exponent where they are not given, and estimates the coefficients on the way.
@@ -103,14 +120,18 @@ impl Session<'_, '_, '_> {
         let typical = self.evidence(spectrum_length(samples, 200))?.period().min(widest as f64);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the record's length")]
         let typical = (typical.round() as usize).max(1);
-        let widths = width.map_or_else(|| half_widths((4 * typical).min(widest)), |width| vec![width]);
+        let mut widths = width.map_or_else(|| half_widths((4 * typical).min(widest)), |width| vec![width]);
         let widest = *widths.last().ok_or(self.too_short())?;
+        if width.is_none() {
+            let least = self.narrowest(typical).min(widest);
+            widths.retain(|&half| half >= least);
+        }
         let usable = Usable::new(&self.record);
         let share = |half: usize| usable.share(half);
         let evidence = self.evidence(spectrum_length(samples, widest))?;
         let candidates = Candidates::new(evidence, &widths, exponent, share, &mut self.stages)?;
         let start = width.unwrap_or_else(|| usable.widest(typical.max(LEAST_HALF_WIDTH), &widths));
-        let mut current = TestFunction::new(start, exponent.unwrap_or(9), delta)?;
+        let mut current = TestFunction::new(start, exponent.unwrap_or(EXPONENT), delta)?;
         let mut tried = Vec::new();
         loop {
             let thinned = self.some_rows(current, widest)?;
@@ -125,7 +146,7 @@ impl Session<'_, '_, '_> {
                     current = best;
                 }
                 _ => {
-                    let end = [widths.first(), widths.last()].contains(&Some(&current.half_width()));
+                    let end = [LEAST_HALF_WIDTH, widest].contains(&current.half_width());
                     let weak = if weak.rows.len() < WeakRows::count(current, samples) {
                         drop(weak);
                         self.rows(current)?

@@ -23,8 +23,10 @@ use crate::identify::weak::torque_jumps::without_jumps;
 use crate::noise::breaks::search::{Broken, breaks};
 use crate::noise::channel::{rounding_variance, variance_after, weighted_variance};
 use crate::noise::defects::{Defect, Within, defects};
+use crate::noise::low_passed::is_low_passed;
 use crate::noise::passed::PassedNoise;
 use crate::noise::quantisation::quantisation_step;
+use crate::noise::shared_band::shared_until;
 use crate::noise::spikes::{LONGEST, Repaired, spikes};
 use crate::noise::unread::unread;
 use crate::record::samples::Samples;
@@ -307,6 +309,9 @@ fn settled(
 ) -> Result<WeakIdentified, Error> {
     let step = options.quantisation.unwrap_or_else(|| quantisation_step(record.angle));
     let is_rounding = step > 0.0 && channel_noise[0] <= HARDLY_MORE * rounding_variance(step, record.weights);
+    let low_passed = || record.noise.is_none() && [record.angle, record.torque].into_iter().any(is_low_passed);
+    let shared_until =
+        (options.half_width.is_none() && low_passed()).then(|| shared_until(record.angle, record.torque)).flatten();
     // What looks like a pulse where samples are missing may be a loss that was not detected.
     let (mut pulses, mut calm, mut round) = (Vec::new(), Vec::new(), if whole { 0 } else { PULSE_ROUNDS });
     loop {
@@ -321,6 +326,7 @@ fn settled(
             noise: [0.0; 2],
             channel_noise,
             is_rounding,
+            shared_until,
             scan: Scan::default(),
             free_offset: FreeOffset::default(),
             windowed_offset: None,

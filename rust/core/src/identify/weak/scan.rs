@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::error::Error;
 use crate::identify::options::WidthFrom;
 use crate::identify::scanned::{Scan, Scans, wider};
-use crate::identify::weak::choice::Chosen;
+use crate::identify::weak::choice::{Chosen, EXPONENT};
 use crate::identify::weak::decide::{BADLY, BETTER};
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
@@ -17,9 +17,6 @@ use crate::regression::subsample::{cut, place_among, places_of, stretches_of_blo
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 use crate::weak_form::test_function_choice::spectrum_length;
 use crate::weak_form::weak_rows::WeakRows;
-
-/// The exponent where none is given.
-const EXPONENT: usize = 9;
 
 /// Half-widths that the spectra of a long record suggest which the widest test functions of a scan are long, at least.
 const WIDER: usize = 8;
