@@ -218,3 +218,20 @@ def test_what_needs_uniform_times_says_so(call: dict[str, object], message: str)
     times, y = record(2, 100)
     with pytest.raises(ValueError, match=message):
         tvident.fit_local_polynomials(y, t=times, **call)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("steps", ["scattered", "of four digits", "with a gap", "hardly scattered"])
+def test_times_that_show_at_once_that_they_are_irregular_are_those_that_are_looked_at_closely(steps: str) -> None:
+    generator, samples = np.random.default_rng(41), 3000
+    times = 3.0 + np.arange(samples) / 200
+    if steps == "with a gap":
+        times[1000:] += 0.4
+    else:
+        times += generator.uniform(-1, 1, samples) * (1e-5 if steps == "hardly scattered" else 1e-3)
+    times = np.round(times, 4) if steps == "of four digits" else times
+    y = np.sin(20 * times) + 0.02 * generator.standard_normal(samples)
+    plain, looked_at = (tvident.fit_local_polynomials(y, 51, t=one, workers=1) for one in (times, list(times)))
+    np.testing.assert_array_equal(plain.derivatives, looked_at.derivatives)
+    np.testing.assert_array_equal(plain.status, looked_at.status)
+    np.testing.assert_array_equal(plain.sigma, looked_at.sigma)
+    assert plain.order.max() > 2

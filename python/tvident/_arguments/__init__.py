@@ -24,10 +24,10 @@ from tvident._arguments.shown import nearest, shown
 from tvident._arguments.times import (
     NotUniformError,
     begin_of,
-    certainly_irregular,
     check_against_labels,
     clock_changed,
     implied_times,
+    irregular_at_sight,
     printed_step,
     times_of,
 )
@@ -47,7 +47,6 @@ __all__ = [
     "any_array",
     "as_record",
     "begin_of",
-    "certainly_irregular",
     "channel",
     "channels",
     "check_against_labels",
@@ -62,6 +61,7 @@ __all__ = [
     "finite_number",
     "flag",
     "implied_times",
+    "irregular_at_sight",
     "is_table",
     "is_word",
     "labels_in",

@@ -269,16 +269,17 @@ def printed_step(seconds: Seconds) -> float:
     return _quantum(seconds, float(np.spacing(largest)), largest) or 0.0
 
 
-def certainly_irregular(seconds: Seconds, seen: _core.RowTimes) -> bool:
-    """Tell whether `period_of_times` would find increasing times not uniform, where one look at them shows it.
+def irregular_at_sight(t: Any, samples: int) -> _core.RowTimes | None:
+    """Return what the core saw of times that `period_of_times` would find not uniform, where one look at plain numbers shows it."""
+    if not (isinstance(t, np.ndarray) and t.dtype == np.float64 and t.shape == (samples,)):
+        return None
+    seconds: Seconds = np.asarray(t)
+    seen = _core.RowTimes(seconds)
+    return seen if _is_irregular(seconds, seen) else None
 
-    Parameters
-    ----------
-    seconds : ndarray, shape (n,)
-        The times.
-    seen : RowTimes
-        The same, as the core saw them.
-    """
+
+def _is_irregular(seconds: Seconds, seen: _core.RowTimes) -> bool:
+    """Tell whether increasing times are certainly not uniform."""
     largest = seen.largest()
     if seconds.size < 3 or not seen.increase() or not largest < _COUNTABLE * _LONGEST:  # noqa: PLR2004 - one step is uniform
         return False

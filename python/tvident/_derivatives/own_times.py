@@ -33,14 +33,23 @@ def period_or_times(
         given["t"] = arguments.implied_times(values)
     if given["t"] is not None:
         given["t"] = times_in_seconds(given["t"])
+    is_alone = all(one is None for name, one in given.items() if name != "t")
+    if is_alone and arguments.irregular_at_sight(given["t"], channel.shape[-1]) is not None:
+        times: npt.NDArray[np.float64] = np.asarray(given["t"])
+        return given["t"], _mean_step(times), times
     try:
         period = arguments.sample_period(channel.shape[-1], **given)
         arguments.check_no_lost_samples(given["t"], channel)
     except arguments.NotUniformError as error:
-        return given["t"], float(error.times[-1] - error.times[0]) / (channel.shape[-1] - 1), error.times
+        return given["t"], _mean_step(error.times), error.times
     if given["t"] is None:
         arguments.check_against_labels(values, period)
     return given["t"], period, None
+
+
+def _mean_step(times: npt.NDArray[np.float64]) -> float:
+    """Return the mean step of times, the sample period where they are not uniform."""
+    return float(times[-1] - times[0]) / (times.size - 1)
 
 
 def check_plain(*others: object, selection: str) -> None:

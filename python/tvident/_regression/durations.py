@@ -56,12 +56,10 @@ def irregular_times(asked: AskedWindows, rows: int) -> _core.RowTimes | None:
     if asked.t is None or not isinstance(asked.window_length, str):
         return None
     is_alone = asked.delta is None and asked.sample_rate is None
-    if is_alone and isinstance(asked.t, np.ndarray) and asked.t.dtype == np.float64 and asked.t.shape == (rows,):
-        # Most times tell at once.
-        plain: Array = np.asarray(asked.t)
-        seen = _core.RowTimes(plain)
-        if arguments.certainly_irregular(plain, seen):
-            return seen
+    # Most times tell at once.
+    at_once = arguments.irregular_at_sight(asked.t, rows) if is_alone else None
+    if at_once is not None:
+        return at_once
     try:
         asked.period(rows)
     except ValueError:
