@@ -26,6 +26,15 @@ pub(crate) struct GroupSamples {
     pub(crate) references: [f64; MOST_LANES],
 }
 
+/// Samples that enter windows, and samples that leave them, as places within the groups.
+#[allow(clippy::large_enum_variant, reason = "there is one at a time, on the stack")]
+pub(crate) enum Moves {
+    /// The same in all lanes.
+    Alike([Range<usize>; 2]),
+    /// By lane.
+    Apart([[Range<usize>; MOST_LANES]; 2]),
+}
+
 /// Sums over the window that each lane is at.
 pub(crate) struct SlidSums<S: Lanes> {
     /// Of polynomials, and of what is left of the samples.
@@ -51,14 +60,16 @@ impl WindowGroup {
 
 impl GroupSamples {
     /// Reads the samples of a group into each lane.
-    pub(crate) fn read(
+    #[inline(always)]
+    pub(crate) fn read<S: Lanes>(
         &mut self,
-        lanes: usize,
+        simd: S,
         times: &[f64],
         record: &[f64],
         placed: &[PlacedWindow],
         groups: &[WindowGroup],
     ) {
+        let lanes = S::F64_LANES;
         let range =
             |group: &WindowGroup| placed[group.windows.start].samples.start..placed[group.windows.end - 1].samples.end;
         let longest = groups.iter().map(|group| range(group).len()).max().unwrap_or(0);
@@ -75,6 +86,10 @@ impl GroupSamples {
             column[full * lanes..rows * lanes].fill(0.0);
         }
         (self.all, self.first) = ([0; MOST_LANES], [0; MOST_LANES]);
+        // So many rows are made of squares of samples, which are turned.
+        let turned = full / lanes * lanes;
+        let mut begins = [0; MOST_LANES];
+        let (mut middles, mut scales) = ([0.0; MOST_LANES], [0.0; MOST_LANES]);
         for (lane, group) in groups.iter().enumerate() {
             let range = range(group);
             let (middle, scale) = group.scale();
@@ -83,12 +98,67 @@ impl GroupSamples {
             self.references[lane] = reference;
             self.all[lane] = range.len();
             self.first[lane] = placed[group.windows.start].samples.len();
-            let columns = self.times.chunks_exact_mut(lanes).zip(self.samples.chunks_exact_mut(lanes));
-            for ((time, sample), (at, value)) in columns.zip(times[range.clone()].iter().zip(&record[range])) {
+            (begins[lane], middles[lane], scales[lane]) = (range.start, middle, scale);
+            let rest = range.start + turned..range.end;
+            let columns =
+                [&mut self.times, &mut self.samples].map(|column| column[turned * lanes..].chunks_exact_mut(lanes));
+            let [times_of, samples_of] = columns;
+            for ((time, sample), (at, value)) in
+                times_of.zip(samples_of).zip(times[rest.clone()].iter().zip(&record[rest]))
+            {
                 time[lane] = (at - middle) * scale;
                 sample[lane] = value - reference;
             }
         }
+        let [middle, scale, reference] = [&middles, &scales, &self.references].map(|column| simd.load(column, 0));
+        for row in (0..turned).step_by(lanes) {
+            let mut squares = [[middle; MOST_LANES]; 2];
+            for (square, column) in squares.iter_mut().zip([times, record]) {
+                for (values, begin) in square.iter_mut().zip(begins).take(lanes) {
+                    *values = simd.load(column, begin + row);
+                }
+                simd.transpose(&mut square[..lanes]);
+            }
+            let [times_of, samples_of] = squares;
+            for (place, (time, sample)) in times_of.into_iter().zip(samples_of).enumerate().take(lanes) {
+                let at = (row + place) * lanes;
+                simd.store(&mut self.times, at, simd.mul_f64s(simd.sub_f64s(time, middle), scale));
+                simd.store(&mut self.samples, at, simd.sub_f64s(sample, reference));
+            }
+        }
+    }
+
+    /// Weights, times, samples and what is left of them of a row that moves in all lanes, if there is one more.
+    #[inline(always)]
+    fn row<S: Lanes>(&self, simd: S, range: &Range<usize>, place: usize, sign: f64) -> [S::f64s; 4] {
+        if place >= range.len() {
+            return [simd.splat_f64s(0.0); 4];
+        }
+        let at = (range.start + place) * S::F64_LANES;
+        let [times, samples, left] = [&self.times, &self.samples, &self.left].map(|column| simd.load(column, at));
+        [simd.splat_f64s(sign), times, samples, left]
+    }
+
+    /// The same where other samples move in each lane.
+    #[inline(always)]
+    fn gathered<S: Lanes>(
+        &self,
+        simd: S,
+        ranges: &[Range<usize>; MOST_LANES],
+        place: usize,
+        sign: f64,
+    ) -> [S::f64s; 4] {
+        let mut columns = [[0.0; MOST_LANES]; 4];
+        for (lane, range) in ranges.iter().enumerate().take(S::F64_LANES) {
+            if place < range.len() {
+                let at = (range.start + place) * S::F64_LANES + lane;
+                columns[0][lane] = sign;
+                columns[1][lane] = self.times[at];
+                columns[2][lane] = self.samples[at];
+                columns[3][lane] = self.left[at];
+            }
+        }
+        columns.map(|column| simd.load(&column, 0))
     }
 
     /// Sums over each lane's first window, from which the polynomial that fits all of the group best was taken off.
@@ -171,32 +241,25 @@ fn counts(counts: &[usize; MOST_LANES]) -> [f64; MOST_LANES] {
 }
 
 impl<S: Lanes> SlidSums<S> {
-    /// Moves each lane's window: samples enter and leave, as places within the group.
+    /// Moves each lane's window.
     #[inline(always)]
-    pub(crate) fn slide(
-        &mut self,
-        simd: S,
-        degrees: usize,
-        from: &GroupSamples,
-        entering: &[Range<usize>; MOST_LANES],
-        leaving: &[Range<usize>; MOST_LANES],
-    ) {
-        let most = entering.iter().chain(leaving).map(ExactSizeIterator::len).max().unwrap_or(0);
+    pub(crate) fn slide(&mut self, simd: S, degrees: usize, from: &GroupSamples, moves: &Moves) {
+        let most = match moves {
+            Moves::Alike(moves) => moves.iter().map(ExactSizeIterator::len).max(),
+            Moves::Apart(moves) => moves.iter().flatten().map(ExactSizeIterator::len).max(),
+        };
+        let (most, signs) = (most.unwrap_or(0), [1.0, -1.0]);
         for place in 0..most {
-            let mut columns = [[[0.0; MOST_LANES]; 2]; 4];
-            for (side, (ranges, sign)) in [(entering, 1.0), (leaving, -1.0)].into_iter().enumerate() {
-                for (lane, range) in ranges.iter().enumerate().take(S::F64_LANES) {
-                    if place < range.len() {
-                        let at = (range.start + place) * S::F64_LANES + lane;
-                        columns[0][side][lane] = sign;
-                        columns[1][side][lane] = from.times[at];
-                        columns[2][side][lane] = from.samples[at];
-                        columns[3][side][lane] = from.left[at];
-                    }
-                }
+            let mut columns = [[simd.splat_f64s(0.0); 2]; 4];
+            for side in 0..2 {
+                let [weights, times, samples, left] = match moves {
+                    Moves::Alike(moves) => from.row(simd, &moves[side], place, signs[side]),
+                    Moves::Apart(moves) => from.gathered(simd, &moves[side], place, signs[side]),
+                };
+                (columns[0][side], columns[1][side], columns[2][side], columns[3][side]) =
+                    (weights, times, samples, left);
             }
-            let [weights, times, samples, left]: [[S::f64s; 2]; 4] =
-                from_fn(|column| from_fn(|side| simd.load(&columns[column][side], 0)));
+            let [weights, times, samples, left] = columns;
             self.left.add(simd, degrees, &times, &weights, &left);
             for side in 0..2 {
                 let weighted = simd.mul_f64s(weights[side], samples[side]);

@@ -1,8 +1,7 @@
 //! The order of windows side by side, their derivatives and standard errors: as [`crate::irregular::window_fit`] has them for a window alone.
 
 use crate::irregular::order_table::TableColumns;
-use crate::irregular::shared_factor::DERIVATIVES;
-use crate::irregular::shared_sums::MOST;
+use crate::irregular::shared_sums::{DERIVATIVES, MOST};
 use crate::simd::aligned::OnLines;
 use crate::simd::vectors::Lanes;
 
@@ -199,9 +198,9 @@ pub(crate) fn sums<S: Lanes>(
     coefficients: &[S::f64s; MOST],
 ) -> [S::f64s; DERIVATIVES] {
     let mut values = [simd.splat_f64s(0.0); DERIVATIVES];
-    for (value, row) in values.iter_mut().zip(polynomials) {
-        for k in 0..degrees.min(MOST) {
-            *value = simd.mul_add_f64s(row[k], coefficients[k], *value);
+    for (k, coefficient) in coefficients.iter().enumerate().take(degrees) {
+        for (value, row) in values.iter_mut().zip(polynomials) {
+            *value = simd.mul_add_f64s(row[k], *coefficient, *value);
         }
     }
     values

@@ -7,12 +7,9 @@ use std::array::from_fn;
 
 use pulp::NullaryFnOnce;
 
-use crate::irregular::shared_sums::MOST;
+use crate::irregular::shared_sums::{DERIVATIVES, MOST};
 use crate::simd::aligned::OnLines;
 use crate::simd::vectors::Lanes;
-
-/// Derivatives at most, the value among them.
-pub(crate) const DERIVATIVES: usize = 6;
 
 /// Numbers of a row that are solved for together.
 const ABREAST: usize = 4;

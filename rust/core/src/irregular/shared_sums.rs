@@ -8,6 +8,9 @@ use crate::simd::vectors::Lanes;
 /// Polynomials at most.
 pub(crate) const MOST: usize = 16;
 
+/// Derivatives at most, the value among them.
+pub(crate) const DERIVATIVES: usize = 6;
+
 /// Sums over some samples.
 #[derive(Clone)]
 pub(crate) struct ChebyshevSums<S: Lanes> {
@@ -120,26 +123,25 @@ fn add_products<S: Lanes, const N: usize>(simd: S, sum: &mut S::f64s, ones: &[S:
 }
 
 /// A sum of polynomials that is taken off samples, and sums of what is left of them.
-pub(crate) struct TakenOff<S: Lanes, const N: usize> {
+pub(crate) struct TakenOff<S: Lanes> {
     pub(crate) coefficients: OnLines<S::f64s, MOST>,
     /// `Σ T_k y` of what is left, weighted, and `Σ y²`.
     pub(crate) products: OnLines<S::f64s, MOST>,
     pub(crate) square: S::f64s,
-    /// Polynomials at some times.
-    polynomials: OnLines<[S::f64s; N], MOST>,
 }
 
-impl<S: Lanes, const N: usize> TakenOff<S, N> {
+impl<S: Lanes> TakenOff<S> {
     #[inline(always)]
     pub(crate) fn new(simd: S, coefficients: OnLines<S::f64s, MOST>) -> Self {
         let zero = simd.splat_f64s(0.0);
-        let (products, polynomials) = (OnLines([zero; MOST]), OnLines([[zero; N]; MOST]));
-        Self { coefficients, products, square: zero, polynomials }
+        Self { coefficients, products: OnLines([zero; MOST]), square: zero }
     }
 
     /// What is left of samples at some times.
+    ///
+    /// The sum is made from its last coefficient down (Clenshaw 1955), so that polynomials need no memory until products are made with them.
     #[inline(always)]
-    pub(crate) fn take_off(
+    pub(crate) fn take_off<const N: usize>(
         &mut self,
         simd: S,
         degrees: usize,
@@ -148,63 +150,61 @@ impl<S: Lanes, const N: usize> TakenOff<S, N> {
         samples: &mut [S::f64s; N],
     ) {
         let degrees = degrees.min(MOST);
-        let mut pair = NeighbouringDegrees::new(simd, times, &[simd.splat_f64s(1.0); N]);
-        // From the highest coefficient down would need no table, but products need the polynomials.
-        let (polynomials, last_polynomial) = self.polynomials.0[..degrees].as_chunks_mut::<2>();
-        let (coefficients, last_coefficient) = self.coefficients.0[..degrees].as_chunks::<2>();
-        for (polynomials, coefficients) in polynomials.iter_mut().zip(coefficients) {
-            polynomials[0] = pair.lower;
-            subtract(simd, samples, coefficients[0], &pair.lower);
-            pair.raise_lower(simd);
-            polynomials[1] = pair.upper;
-            subtract(simd, samples, coefficients[1], &pair.upper);
-            pair.raise_upper(simd);
+        let zero = simd.splat_f64s(0.0);
+        let (mut twice, mut last, mut before) = ([zero; N], [zero; N], [zero; N]);
+        for n in 0..N {
+            twice[n] = simd.add_f64s(times[n], times[n]);
         }
-        if let ([polynomial], [coefficient]) = (last_polynomial, last_coefficient) {
-            *polynomial = pair.lower;
-            subtract(simd, samples, *coefficient, &pair.lower);
+        let (pairs, top) = self.coefficients.0[1..degrees].as_chunks::<2>();
+        if let [top] = top {
+            last = [*top; N];
+        }
+        // Two steps at a time, each in the place of the one before the last.
+        for [lower, upper] in pairs.iter().rev() {
+            for n in 0..N {
+                before[n] = simd.mul_add_f64s(twice[n], last[n], simd.sub_f64s(*upper, before[n]));
+            }
+            for n in 0..N {
+                last[n] = simd.mul_add_f64s(twice[n], before[n], simd.sub_f64s(*lower, last[n]));
+            }
         }
         let mut weighted = *samples;
         for n in 0..N {
+            let value = simd.mul_add_f64s(times[n], last[n], simd.sub_f64s(self.coefficients.0[0], before[n]));
+            samples[n] = simd.sub_f64s(samples[n], value);
             weighted[n] = simd.mul_f64s(samples[n], weights[n]);
             self.square = simd.mul_add_f64s(weighted[n], samples[n], self.square);
         }
-        for (product, polynomial) in self.products.0.iter_mut().zip(&self.polynomials.0).take(degrees) {
-            add_products(simd, product, polynomial, &weighted);
+        // What is left multiplies every polynomial, for their recurrence is linear.
+        let mut pair = NeighbouringDegrees::new(simd, times, &weighted);
+        let (products, last_product) = self.products.0[..degrees].as_chunks_mut::<2>();
+        for products in products {
+            add_all(simd, &mut products[0], &pair.lower);
+            pair.raise_lower(simd);
+            add_all(simd, &mut products[1], &pair.upper);
+            pair.raise_upper(simd);
         }
-    }
-}
-
-#[inline(always)]
-fn subtract<S: Lanes, const N: usize>(
-    simd: S,
-    samples: &mut [S::f64s; N],
-    coefficient: S::f64s,
-    polynomial: &[S::f64s; N],
-) {
-    for (sample, value) in samples.iter_mut().zip(polynomial) {
-        *sample = simd.negate_mul_add_f64s(coefficient, *value, *sample);
+        if let [product] = last_product {
+            add_all(simd, product, &pair.lower);
+        }
     }
 }
 
 /// The polynomials and their derivatives at a time: by derivative, then by degree.
 #[inline(always)]
 pub(crate) fn at<S: Lanes>(simd: S, degrees: usize, time: S::f64s, derivatives: &mut [[S::f64s; MOST]]) {
-    let (zero, twice) = (simd.splat_f64s(0.0), simd.add_f64s(time, time));
-    for derivative in 0..derivatives.len() {
-        // T_{k+1} = 2 u T_k - T_{k-1}, differentiated; T_{-1} = T_1 = u.
-        let factor = simd.splat_f64s(2.0 * derivative as f64);
-        let (mut last, mut before) = match derivative {
-            0 => (simd.splat_f64s(1.0), simd.neg_f64s(time)),
-            1 => (zero, simd.splat_f64s(-1.0)),
-            _ => (zero, zero),
-        };
-        #[allow(clippy::needless_range_loop, reason = "two rows of one table")]
-        for k in 0..degrees.min(MOST) {
-            derivatives[derivative][k] = last;
-            let lower = if derivative == 0 { zero } else { derivatives[derivative - 1][k] };
-            let next = simd.mul_add_f64s(factor, lower, simd.mul_add_f64s(twice, last, before));
-            (last, before) = (next, simd.neg_f64s(last));
+    let (zero, one, twice) = (simd.splat_f64s(0.0), simd.splat_f64s(1.0), simd.add_f64s(time, time));
+    // T_{k+1} = 2 u T_k - T_{k-1}, differentiated; T_{-1} = T_1 = u.
+    let (mut last, mut before) = ([zero; DERIVATIVES], [zero; DERIVATIVES]);
+    (last[0], before[0], before[1]) = (one, simd.neg_f64s(time), simd.neg_f64s(one));
+    for k in 0..degrees.min(MOST) {
+        let mut lower = zero;
+        for (derivative, values) in derivatives.iter_mut().enumerate().take(DERIVATIVES) {
+            values[k] = last[derivative];
+            let factor = simd.splat_f64s(2.0 * derivative as f64);
+            let raised = simd.mul_add_f64s(twice, last[derivative], before[derivative]);
+            (before[derivative], lower, last[derivative]) =
+                (simd.neg_f64s(last[derivative]), last[derivative], simd.mul_add_f64s(factor, lower, raised));
         }
     }
 }

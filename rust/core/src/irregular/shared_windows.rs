@@ -7,12 +7,12 @@
 use std::array::from_fn;
 
 use crate::irregular::order_table::{OrderTable, TableColumns};
-use crate::irregular::shared_buffers::{GroupSamples, SlidSums};
+use crate::irregular::shared_buffers::{GroupSamples, Moves, SlidSums};
 use crate::irregular::shared_choice::{OrderResiduals, OrderShares, SharedChoice, sums};
-use crate::irregular::shared_factor::{DERIVATIVES, SharedFactor};
-use crate::irregular::shared_sums::{MOST, at};
+use crate::irregular::shared_factor::SharedFactor;
+use crate::irregular::shared_sums::{DERIVATIVES, MOST, at};
 use crate::irregular::window_estimates::{WindowFit, WindowFits};
-use crate::irregular::window_places::{Numbered, PlacedWindow, WindowGroup};
+use crate::irregular::window_places::{Numbered, PlacedWindow, WindowGroup, WindowSpan};
 use crate::local_polynomials::options::Order;
 use crate::local_polynomials::sliding_projection::ROUNDING;
 use crate::simd::aligned::OnLines;
@@ -121,25 +121,36 @@ impl WindowsAbreast<'_, '_> {
     #[inline(always)]
     fn batch<S: Lanes>(&mut self, simd: S, groups: &[WindowGroup], work: &mut Workspace<S>) {
         let degrees = groups[0].degrees;
-        self.memory.read(S::F64_LANES, &self.fit.times, self.record, self.placed, groups);
+        self.memory.read(simd, &self.fit.times, self.record, self.placed, groups);
         let mut sums = self.memory.begin(simd, degrees, &mut work.factor);
         let mut abreast = Abreast::of(groups, self.memory.references);
         let longest = groups.iter().map(|group| group.windows.len()).max().unwrap_or(0);
         for step in 0..longest {
             if step > 0 {
-                let (mut entering, mut leaving) = (from_fn(|_| 0..0), from_fn(|_| 0..0));
-                for (lane, group) in groups.iter().enumerate().filter(|(_, group)| step < group.windows.len()) {
-                    let [first, old, new] =
-                        [0, step - 1, step].map(|at| &self.placed[group.windows.start + at].samples);
-                    entering[lane] = old.end - first.start..new.end - first.start;
-                    leaving[lane] = old.start - first.start..new.start - first.start;
-                }
-                sums.slide(simd, degrees, self.memory, &entering, &leaving);
+                sums.slide(simd, degrees, self.memory, &self.moves(groups, step));
             }
             self.step_to(&mut abreast, groups, step, &mut work.columns);
             let found = self.solve(simd, degrees, &abreast, &sums, work);
             self.write(degrees, &abreast, &found);
         }
+    }
+
+    /// Which samples enter the windows and which leave them on the way to a step.
+    fn moves(&self, groups: &[WindowGroup], step: usize) -> Moves {
+        let of_group = |group: &WindowGroup| {
+            let [first, old, new] = [0, step - 1, step].map(|at| &self.placed[group.windows.start + at].samples);
+            [old.end - first.start..new.end - first.start, old.start - first.start..new.start - first.start]
+        };
+        let mut there = groups.iter().enumerate().filter(|(_, group)| step < group.windows.len());
+        if matches!(self.fit.span, WindowSpan::Samples(_)) {
+            // Lanes that have no window any more move on: nobody looks at them.
+            return Moves::Alike(there.next().map_or([0..0, 0..0], |(_, group)| of_group(group)));
+        }
+        let mut moves = [from_fn(|_| 0..0), from_fn(|_| 0..0)];
+        for (lane, group) in there {
+            [moves[0][lane], moves[1][lane]] = of_group(group);
+        }
+        Moves::Apart(moves)
     }
 
     /// Steps to a window of each group.
