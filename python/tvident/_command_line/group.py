@@ -47,6 +47,8 @@ def _in_plain_words() -> Iterator[None]:
         if error.errno == errno.EPIPE:
             raise  # whoever reads the output has had enough: click ends without a word
         _let_go_of_output()
+        if error.strerror is None:
+            raise click.ClickException(_line(error)) from None  # in words of ours
         place = "the output" if error.filename is None else _line(error.filename)
         raise click.ClickException(f"{place}: {_line(error.strerror)}") from None
 

@@ -89,7 +89,7 @@ RUN = options_of(
     click.option(
         "-o",
         "--output",
-        type=click.Path(dir_okay=False),
+        type=click.Path(),  # a Zarr array is a folder
         help="File for the results: .csv, .npz, .parquet, .h5, .mat or .xlsx, or - for CSV here.",
     ),
     click.option("--plot", type=click.Path(dir_okay=False), help="Picture of the results: PNG, PDF or SVG."),

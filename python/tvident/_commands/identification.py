@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Literal
 
 import click
@@ -18,6 +18,7 @@ from tvident._commands.method import NAMES, method_of
 from tvident._commands.output import RECORDING
 from tvident._commands.scales import scaled
 from tvident._commands.settings import read_settings
+from tvident._commands.words import units_assumed
 from tvident._equation import COEFFICIENTS
 from tvident._units import axis_of
 
@@ -116,17 +117,9 @@ def _say_assumed(signals: Mapping[str, Any], times: Any, options: Mapping[str, A
     given = {name: options.get(name) for name in ("angle_unit", "torque_unit", "time_unit")}
     axis = axis_of(signals.get("angle"), signals.get("torque"), times, **given)
     there = {"angle": "angle" in signals, "torque": "torque" in signals, "time": times is not None}
-    names = [name for name, is_there in there.items() if is_there and name in axis.assumed]
-    if names:
-        units, cures = [axis.system.units[name] for name in names], [f"--{name}-unit" for name in names]
-        click.echo(
-            f"Units: none said of {_and(names)}, taken as {_and(units)}; if they are others, give {_and(cures)}",
-            err=True,
-        )
-
-
-def _and(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+    assumed = {name: axis.system.units[name] for name, is_there in there.items() if is_there and name in axis.assumed}
+    if assumed:
+        click.echo(units_assumed(assumed), err=True)
 
 
 def _both(times: npt.NDArray[Any] | None, of_torque: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:

@@ -13,10 +13,12 @@ import tvident
 from tvident._commands.equation import lag_of, terms_of
 from tvident._commands.given import given, wanted_progress
 from tvident._commands.method import NAMES, method_of
-from tvident._commands.output import SETTINGS, check_outputs, say
+from tvident._commands.output import RECORDING, RESULTS, SETTINGS, check_outputs, say
 from tvident._commands.settings import read_settings
+from tvident._commands.words import units_assumed
 from tvident._equation import COEFFICIENTS
-from tvident._files import replaced
+from tvident._files import check_apart, replaced
+from tvident._status import Status
 
 _TAKEN = frozenset(
     {
@@ -49,8 +51,11 @@ def identify_in_pieces(
     options: Mapping[str, Any],
 ) -> None:
     """Identify a recording from file to file."""
-    if file is None or output is None or output == "-":
-        raise click.UsageError("--in-pieces goes from a FILE to a file; got none; name the file, and give -o")
+    if file in (None, "-") or output in (None, "-"):
+        raise click.UsageError(
+            "--in-pieces goes from a FILE to a file; got "
+            f"{'a pipe' if '-' in (file, output) else 'none'}; name the file, and give -o"
+        )
     asked: dict[str, Any] = given(dict(options))
     refused = [
         name
@@ -61,13 +66,16 @@ def identify_in_pieces(
         raise click.UsageError(
             f"--{refused[0].replace('_', '-')} needs the whole recording in memory; got it with --in-pieces; leave one of them out"
         )
-    check_outputs({SETTINGS: settings_output}, {"the recording": file})
+    check_outputs({SETTINGS: settings_output}, {})
+    check_apart(
+        {RESULTS: output, SETTINGS: settings_output}, {RECORDING: file, "earlier settings": asked.get("settings")}
+    )
     of_method = {name: value for name, value in asked.items() if name in NAMES}
     settings, lag, method = asked.get("settings"), asked.get("lag"), asked.get("method")
     coefficients: dict[str, Any] = {name: _number(asked[name]) for name in COEFFICIENTS if name in asked}
     found = tvident.identify_file(
-        file,
-        output,
+        str(file),
+        str(output),
         angle=str(options["angle"]),
         torque=str(options["torque"]),
         t=asked.get("time_channel"),
@@ -96,7 +104,11 @@ def identify_in_pieces(
     if settings_output is not None:
         with replaced(Path(settings_output)) as written:
             written.write((json.dumps(found.settings, indent=1) + "\n").encode())
+    if found.assumed:
+        click.echo(units_assumed(found.assumed), err=True)
     say(found.summary())
+    if found.flags.get(Status.INVALID.name or "", 0) == found.rows:
+        click.get_current_context().exit(1)
 
 
 def _number(value: str) -> str | float:

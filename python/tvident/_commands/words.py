@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import shlex
+from collections.abc import Mapping, Sequence
 
 import click
 
@@ -52,6 +53,22 @@ def in_options(text: str) -> str:
         return _option(found, options)
 
     return _CURE.sub(said, text)
+
+
+def units_assumed(units: Mapping[str, str]) -> str:
+    """Return what to say of channels whose units nobody said.
+
+    Parameters
+    ----------
+    units : mapping of str to str
+        What they were taken for: those of ``angle``, ``torque`` and ``time``.
+    """
+    cures = [f"--{name}-unit" for name in units]
+    return f"Units: none said of {_and([*units])}, taken as {_and([*units.values()])}; if they are others, give {_and(cures)}"
+
+
+def _and(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def _option(found: re.Match[str], options: set[str]) -> str:

@@ -52,13 +52,13 @@ def end_of_links(path: Path) -> Path:
 
 
 def writes_through(path: Path) -> bool:
-    """Return whether a path is a pipe, a device or a stream of this process: nothing that another file could replace."""
+    """Return whether a path is a pipe, a device or a stream of this process: nothing that another file or folder could replace."""
     try:
         kind = path.stat().st_mode
     except OSError:
         return False
     folder = os.path.realpath(path.parent)
-    return not stat.S_ISREG(kind) or folder == "/dev" or folder.startswith("/proc/")
+    return not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)) or folder == "/dev" or folder.startswith("/proc/")
 
 
 def check_apart(outputs: Mapping[str, str | Path | None], inputs: Mapping[str, str | Path | None]) -> None:
@@ -96,7 +96,8 @@ def _exists(path: Path) -> bool:
 
 
 def _are_one(path: Path, other: Path) -> bool:
-    """Return whether two paths lead to the same file, or would once it is written."""
-    if _exists(path) and _exists(other):
-        return path.samefile(other) and not writes_through(path)
-    return os.path.realpath(path) == os.path.realpath(other)
+    """Return whether two paths lead to the same file, or would once it is written, or the first is a folder that holds the other."""
+    if _exists(path) and _exists(other) and path.samefile(other):
+        return not writes_through(path)
+    ends = Path(os.path.realpath(path)), Path(os.path.realpath(other))
+    return ends[0] == ends[1] or (_exists(path) and path.is_dir() and ends[1].is_relative_to(ends[0]))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from tvident import _arguments as arguments
 from tvident._status import Status
 
 
@@ -34,6 +35,8 @@ class FileIdentification:
         Units of the columns by name.
     advice : tuple of str
         What is worth doing, of pieces and of the stretches that choices were made from.
+    assumed : dict of str to str
+        Those of angle and torque of which neither the file nor the call said the unit, and what they were taken for.
 
     See Also
     --------
@@ -61,6 +64,7 @@ class FileIdentification:
     settings: Mapping[str, Any]
     units: Mapping[str, str]
     advice: tuple[str, ...] = ()
+    assumed: Mapping[str, str] = field(default_factory=dict)
 
     def summary(self) -> str:
         """Return in words what was found, and what is worth doing.
@@ -76,7 +80,7 @@ class FileIdentification:
         """
         lines = [f"{self.samples} samples, {self.rows} rows in {self.path}"]
         lines += [
-            f"{name} = {value:.8g} ± {error:.2g} {self.units.get(name, '')}".rstrip()
+            f"{name} = {arguments.with_error(value, error)} {self.units.get(name, '')}".rstrip()
             for name, (value, error) in self.constants.items()
         ]
         if self.record_status:

@@ -51,6 +51,12 @@ class RecordingOfFile:
     weights: SourceChannel | None = None
     opened: tuple[Path, str] | None = None
 
+    @property
+    def assumed(self) -> dict[str, str]:
+        """Those of angle and torque of which nobody said the unit, and what they are taken for."""
+        units = self.axis.system.units
+        return {name: units[name] for name in ("angle", "torque") if name in self.axis.assumed}
+
     def held(self, spans: Sequence[Span]) -> Held:
         """Read some parts."""
         channels = [(self.angle, self.axis.angle), (self.torque, self.axis.torque)]

@@ -197,6 +197,7 @@ class Run:
             settings,
             self._asked.units,
             tuple(advice),
+            self._asked.recording.assumed,
         )
 
     def _put_in_place(self, work: Work, means: Mapping[str, Mean], told: Mapping[str, Any]) -> None:
