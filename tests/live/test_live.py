@@ -17,8 +17,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from click.testing import CliRunner
 
 import tvident
+from tvident._command_line import main
 from tvident._live import Inlet, LiveClock, Outlet
 
 SECONDS = float(os.environ.get("TVIDENT_LIVE", "10"))
@@ -337,3 +339,34 @@ def test_few_losses_by_a_counter_alone_are_no_wrong_rate() -> None:
         clock.rows((math.nan, 1.0, 2.0), number)
     assert clock.lost == 9
     assert not any("more samples are missing" in said for said in clock.words())
+
+
+def test_a_damaged_byte_is_a_lost_sample() -> None:
+    """A NUL anywhere in the first block ended the session."""
+    rows = [f"{a!r},{b!r}\n" for a, b in zip(RIG.angle[:900].tolist(), RIG.torque[:900].tolist(), strict=True)]
+    rows[500] = "\0\1,\0\n"
+    found, words = run("".join(rows), "--angle", "0", "--torque", "1", "--sample-rate", "1000")
+    assert len(found) == 900
+    assert "1 lines could not be read and count as missing" in words
+
+
+def test_stamps_of_another_rate_are_said_at_once() -> None:
+    clock, _ = clocked((np.arange(400) / 1000).tolist(), period=1 / 500)
+    words = "stamps show 1000 Hz, not 500: parameters are wrong; give --sample-rate 1000"
+    assert words in clock.comes_faster
+    assert words in clock.words()[0]
+    twice, _ = clocked(np.repeat(np.arange(2000) / 1000, np.where(np.arange(2000) % 10, 1, 2)).tolist())
+    assert not twice.comes_faster
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"), [('{"angle": 1.0, "torque": 2.0}\n' * 5, "which has no 'tork'"), ("", "got none that does")]
+)
+def test_lines_without_the_channel_end_with_the_key_that_is_missing(lines: str, words: str) -> None:
+    """Nothing but nulls went out, and the session ended well."""
+    done = CliRunner().invoke(
+        main, ["live", "-", "--angle", "angle", "--torque", "tork", "--sample-rate", "1000"], lines
+    )
+    assert done.exit_code == 1
+    assert words in done.stderr
+    assert "lines must hold the channels; got none that does" in done.stderr

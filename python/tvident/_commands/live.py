@@ -98,10 +98,20 @@ def live(
         outlet.close()
     for words in session.words():
         click.echo(words, err=True)
-    if isinstance(source, Lines) and source.unreadable:
+    if isinstance(source, Lines):
+        _say_read(source)
+
+
+def _say_read(lines: Lines) -> None:
+    """Say which lines could not be read; end with an error where that is all of them, or none came."""
+    if lines.unreadable:
         click.echo(
-            f"{source.unreadable} lines could not be read and count as missing; the first is {source.first_unreadable!r}",
+            f"{lines.unreadable} lines could not be read and count as missing; the first is {lines.first_unreadable}",
             err=True,
+        )
+    if not lines.read:
+        raise click.ClickException(
+            "lines must hold the channels; got none that does; look at what is piped, and at --angle and --torque"
         )
 
 
@@ -134,9 +144,13 @@ def _run(
 ) -> None:
     """Take pieces until the source ends, time is up, or Ctrl-C."""
     end = math.inf if duration is None else time.monotonic() + duration
+    is_said = False
     try:
         for piece in pieces:
             session.take(piece, has_counter=has_counter)
+            if not is_said and session.clock.comes_faster:
+                is_said = True
+                click.echo(f"Warning: {session.clock.comes_faster}", err=True)
             if time.monotonic() >= end:
                 break
     except KeyboardInterrupt:

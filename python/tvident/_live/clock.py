@@ -26,6 +26,9 @@ _KNOWN, _NO_MISTAKE = 1e-3, 0.1
 _MOST_LOST = 1_000_000
 """A longer gap is no loss, but another recording."""
 
+_ENOUGH, _MOST_REPEATED, _FASTER = 200, 0.1, 1.1
+"""Stamps that say at which rate they come, the part of them that may come twice, and how much faster than nominal they may be then."""
+
 _NOTABLE = 1e-3
 """Of the rate: inertia goes with its square."""
 
@@ -92,12 +95,18 @@ class LiveClock:
         self._next = 0
         self._expected = self._last = math.nan
         self._counter: int | None = None
+        self._begin, self._stamped = math.nan, 0
         self._highest = self._came = 0
         self.rate = Rate()
+        self._newest = math.nan
         self.lost = self.repeated = self.jumps = self.back = 0
 
     def rows(self, row: Row, counter: float | None = None) -> list[Row]:
         """Take a sample, and return those that are in order now."""
+        if math.isfinite(row[0]):
+            self._begin = row[0] if math.isnan(self._begin) else self._begin
+            self._stamped += 1
+            self._newest = row[0]
         if counter is not None:
             return self._counted(row, counter)
         step = (row[0] - self._last) / self._seconds()
@@ -174,6 +183,7 @@ class LiveClock:
     def _jumped(self, stamp: float) -> list[Row]:
         """Begin anew with a clock that was set, and return what keeps windows from what was before."""
         self.jumps += 1
+        self._begin, self._stamped = stamp, 1
         self.rate, self._next, self._expected = Rate(), 0, stamp
         return [_apart(stamp)]
 
@@ -198,11 +208,27 @@ class LiveClock:
         self._expected += self._seconds()
         return row
 
+    @property
+    def comes_faster(self) -> str:
+        """What to say where stamps show a higher rate than the nominal one, by which samples seem to come twice; nothing elsewhere."""
+        if self._stamped < _ENOUGH or self.repeated < _MOST_REPEATED * self._stamped or self._newest <= self._begin:
+            return ""
+        rate = (self._stamped - 1) / (self._newest - self._begin)
+        if rate < _FASTER / self._period:
+            return ""
+        nominal = 1 / self._period
+        return (
+            f"samples must come at the nominal rate; stamps show {rate:.7g} Hz, not {nominal:.6g}: parameters are wrong; "
+            f"give --sample-rate {rate:.7g}"
+        )
+
     def words(self) -> list[str]:
         """Return what there is to say of the clock."""
         nominal, period, error = 1 / self._period, self.rate.period, self.rate.error
         if not (math.isfinite(period) and period > 0 and math.isfinite(error)):
             said = [f"rate: {nominal:.6g} Hz nominal; no stamps to compare it with"]
+        elif self.comes_faster:
+            said = [f"rate: {self.comes_faster}"]
         else:
             drift, of_drift = (self._period / period - 1) * 1e6, error / period * 1e6
             said = [

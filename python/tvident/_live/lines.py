@@ -15,6 +15,8 @@ from typing import Any
 from tvident._units import is_unit, named_unit
 
 _BLOCK = 1 << 16
+_DAMAGED = 1e-3
+"""Of the bytes of a text, at most: of random bytes one of 256 is NUL."""
 _LONGEST = 1 << 20
 """Bytes of a line."""
 
@@ -44,8 +46,9 @@ class Lines:
         self._is_begun = self._has_ended = False
         self.units = [""] * len(self._names)
         """Of the channels, as a header or a line below it says them."""
-        self.unreadable = 0
+        self.read = self.unreadable = 0
         self.first_unreadable = ""
+        """The line, and the key that it has not."""
 
     def begin(self, wait: float, until: float) -> None:
         """Wait for the lines that say units: the first, and the one below a header; no longer than until a time of the monotonic clock."""
@@ -73,7 +76,7 @@ class Lines:
             return []
         block = os.read(self._descriptor, _BLOCK)
         self._has_ended = not block
-        if not self._is_begun and not self._early and b"\0" in block:
+        if not self._is_begun and not self._early and _is_no_text(block):
             raise ValueError(
                 "lines must be UTF-8; they hold the character NUL, as UTF-16 does; write them as UTF-8, in PowerShell by "
                 "$OutputEncoding = [Text.Encoding]::UTF8"
@@ -126,11 +129,19 @@ class Lines:
         if not _says_something(line) or self._cells is None:
             return None
         try:
-            return self._cells(line)
-        except (ValueError, IndexError, KeyError, TypeError, RecursionError):
+            row = self._cells(line)
+        except (ValueError, IndexError, KeyError, TypeError, RecursionError) as error:
             self.unreadable += 1
-            self.first_unreadable = self.first_unreadable or line[:80]
+            lacks = f", which has no {error.args[0]!r}" if isinstance(error, KeyError) else ""
+            self.first_unreadable = self.first_unreadable or f"{line[:80]!r}{lacks}"
             return [math.nan] * len(self._names)
+        self.read += 1
+        return row
+
+
+def _is_no_text(block: bytes) -> bool:
+    """Return whether what comes first is UTF-16 or packed, and not text in which a byte was damaged."""
+    return b"\0" in block.split(b"\n", 1)[0] or block.count(b"\0") > len(block) * _DAMAGED
 
 
 def _says_something(line: str) -> bool:
