@@ -49,16 +49,36 @@ class Labels:
         }
         return replace(self, index=index, coordinates=coordinates)
 
-    def of_record(self, place: Any) -> Labels:
-        """Return the labels of what NumPy's indexing takes along the first axis."""
-        records = None if self.records is None else self.records[place]
+    def of_records(self, place: Any, axes: int) -> Labels:
+        """Return the labels of what NumPy's indexing takes of a batch: an index without an ellipsis, and how many axes it leaves."""
+        parts = place if isinstance(place, tuple) else (place,)
         if not self.dims:
-            return replace(self, records=records if isinstance(place, slice) else None)
-        first = self.dims[0]
-        coordinates = {
-            name: one.isel({first: place}) if first in one.dims else one for name, one in self.coordinates.items()
-        }
-        return replace(self, dims=self.dims if isinstance(place, slice) else self.dims[1:], coordinates=coordinates)
+            is_named = self.records is not None and axes == 1 and len(parts) == 1
+            return replace(self, records=_taken(self.records, parts[0]) if is_named else None)
+        *batch, time = self.dims
+        parts = (*parts, *[slice(None)] * (len(batch) - len(parts)))
+        lists = [part for part in parts if not isinstance(part, slice | int | np.integer)]
+        if len(parts) > len(batch) or len(lists) > 1 or any(np.ndim(part) != 1 for part in lists):
+            # Axes that indexing makes or joins have no names.
+            names = ["record"] if axes == 1 else [f"record_{axis}" for axis in range(axes)]
+            there = {name: one for name, one in self.coordinates.items() if set(one.dims) <= {time}}
+            return replace(self, dims=(*names, time), coordinates=there)
+        coordinates = dict(self.coordinates)
+        for dim, part in zip(batch, parts, strict=True):
+            for name, one in coordinates.items():
+                if dim in one.dims:
+                    places = part if isinstance(part, slice) else np.arange(one.sizes[dim])[part]
+                    coordinates[name] = one.isel({dim: places})
+        kept = [dim for dim, part in zip(batch, parts, strict=True) if not isinstance(part, int | np.integer)]
+        return replace(self, dims=(*kept, time), coordinates=coordinates)
+
+
+def _taken(records: Any, part: Any) -> Any:
+    """Return the names of some records: columns of pandas, or a list."""
+    if isinstance(part, slice):
+        return records[part]
+    places = np.arange(len(records))[part]
+    return records[places] if hasattr(records, "take") else [records[place] for place in places]
 
 
 def labels_of(values: Any) -> Labels | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import EllipsisType
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -16,6 +17,9 @@ from tvident._status import Status
 
 At: TypeAlias = float | str | dt.date | np.datetime64 | None
 """When a part of a result begins or ends: seconds, or a date."""
+
+Place: TypeAlias = int | slice | EllipsisType | Sequence[int] | npt.NDArray[np.bool_] | npt.NDArray[np.integer] | None
+"""What stands for records of a batch, as in NumPy's indexing."""
 
 _LISTS = ("lag_samples", "shown_noise")
 _ONE_EACH = (
@@ -126,9 +130,40 @@ def of_records(found: Estimates, place: Any) -> Estimates:
         status=found.status[place],
         record_status=flags if np.ndim(flags) else Status(int(flags)),
         scans=tuple(found.scans[one] for one in chosen(place, batch)) if found.scans else (),
-        labels=None if found.labels is None else found.labels.of_record(place),
+        labels=None if found.labels is None else found.labels.of_records(place, np.ndim(flags)),
         kinds=kinds,
     )
+
+
+def in_batch(place: Any, batch: tuple[int, ...]) -> Any:
+    """Return an index of records without an ellipsis, which would reach the axis of samples where arrays have one.
+
+    Raises
+    ------
+    IndexError
+        If there are no such records.
+    """
+    parts = place if isinstance(place, tuple) else (place,)
+    try:
+        np.empty(batch, bool)[place]
+    except IndexError as error:
+        raise IndexError(
+            f"an index must name records of a batch of shape {batch}; got {arguments.shown(place)}: {error}; samples are those of "
+            "result.between(t0, t1)"
+        ) from None
+    at = next((number for number, part in enumerate(parts) if part is Ellipsis), None)
+    if at is None:
+        return place
+    left = len(batch) - sum(_axes_taken(part) for part in parts if part is not Ellipsis)
+    return (*parts[:at], *[slice(None)] * left, *parts[at + 1 :])
+
+
+def _axes_taken(part: Any) -> int:
+    """Return how many axes a part of an index stands for."""
+    if part is None:
+        return 0
+    values = np.asarray(part) if not isinstance(part, slice) else np.asarray(0)
+    return values.ndim if values.dtype == bool else 1
 
 
 def chosen(place: Any, batch: tuple[int, ...]) -> list[int]:
