@@ -107,6 +107,24 @@ def test_what_a_record_does_not_determine_chooses_nothing_and_is_said() -> None:
     assert "in no model that counts: coulomb" in compared.summary()
 
 
+def test_a_model_that_cannot_tell_its_own_parameters_apart_is_not_averaged() -> None:
+    """A spring and gravity are one function of small angles: a stiffness of 8 N m/rad was averaged to 8 ± 246."""
+    angle, torque = oscillator(1)
+    angle, torque = 0.02 * angle, 0.02 * torque
+    models: dict[str, dict[str, Any]] = {"spring": {"terms": ()}, "both": {"terms": ("gravity",)}}
+    compared = tvident.compare_models(angle, torque, models=models, sample_rate=1000, **CONSTANT)
+    assert tvident.Status.ILL_CONDITIONED & int(compared.results["both"].record_status)
+    assert compared.results["both"].constants["stiffness"][1] > 10
+    assert compared.averaged["stiffness"] == pytest.approx(compared.results["spring"].constants["stiffness"])
+    words = compared.summary()
+    assert "'both' cannot tell its own parameters apart, so averages leave it out; see its advice" in words
+    assert "in no model that counts: gravity" in words
+    models["spring"] = {"stiffness": 0.0}
+    alone = tvident.compare_models(angle, torque, models=models, sample_rate=1000, **CONSTANT)
+    assert "leave it out" not in alone.summary()
+    assert alone.averaged["stiffness"] == pytest.approx(alone.results["both"].constants["stiffness"])
+
+
 def test_errors_know_of_the_choice() -> None:
     compared = tvident.compare_models(*oscillator(3, cubic=0.4), models=CANDIDATES, sample_rate=1000, **CONSTANT)
     weights = dict(zip(compared.table["model"], compared.table["weight"], strict=True))

@@ -25,6 +25,9 @@ Array: TypeAlias = npt.NDArray[np.float64]
 _ABOUT_EQUAL = 2.0
 """Models whose criteria differ by less are supported about equally (Burnham & Anderson)."""
 
+_NO_SUPPORT = 10.0
+"""A model whose criterion is higher than that of the best by more has essentially none (Burnham & Anderson)."""
+
 _NO_WEIGHT = 1e-3
 """Models of less weight say nothing of their terms."""
 
@@ -42,7 +45,8 @@ class ModelComparison:
     best : str
         The model with the lowest criterion.
     averaged : dict of str to (value, stderr)
-        Inertia, damping, stiffness and terms, averaged with the models' weights; zero in models that leave them out. The errors know of
+        Inertia, damping, stiffness and terms, averaged with the models' weights; zero in models that leave them out. Models that cannot
+        tell their own parameters apart (ILL_CONDITIONED) are left out where another one has support. The errors know of
         the choice: they contain the spread between models. Numbers, or arrays of shape (n,) where a model lets them change.
     observations : float
         Effective number of observations.
@@ -89,7 +93,20 @@ class ModelComparison:
             "difference": np.where(np.isfinite(scores), scores - (best if np.isfinite(best) else 0.0), np.inf)[order],
             "weight": weights[order],
         }
-        self.averaged = {name: self._average(name, weights) for name in self._names()}
+        self._twins = self._without_distinction()
+        kept = weights * [name not in self._twins for name in names]
+        self.averaged = {name: self._average(name, kept) for name in self._names()}
+
+    def _without_distinction(self) -> list[str]:
+        """Return models that do not tell their own parameters apart, where another one that does has support."""
+        each = dict(zip(self.table["model"].tolist(), self.table["difference"].tolist(), strict=True))
+        twins = [
+            name
+            for name, result in self.results.items()
+            if Status(int(result.record_status)) & Status.ILL_CONDITIONED and math.isfinite(each[name])
+        ]
+        others = [difference for name, difference in each.items() if name not in twins]
+        return twins if min(others, default=math.inf) < _NO_SUPPORT else []
 
     def _names(self) -> list[str]:
         terms = [name for result in self.results.values() for name in result.terms]
@@ -161,6 +178,12 @@ class ModelComparison:
         lost = [str(name) for name in self.table["model"][~np.isfinite(self.table["aicc"])]]
         if lost:
             words.append(f"the record does not determine {_quoted(lost)}")
+        if self._twins:
+            words.append(
+                f"{_quoted(self._twins)} cannot tell its own parameters apart, so averages leave it out; see its advice"
+                if len(self._twins) == 1
+                else f"{_quoted(self._twins)} cannot tell their own parameters apart, so averages leave them out; see their advice"
+            )
         idle = self._without_support()
         if idle:
             words.append(f"in no model that counts: {', '.join(idle)}")
@@ -182,7 +205,7 @@ class ModelComparison:
         counts = {
             str(name)
             for name, weight in zip(self.table["model"], self.table["weight"], strict=True)
-            if weight > _NO_WEIGHT
+            if weight > _NO_WEIGHT and name not in self._twins
         }
         kept = {term for name in counts for term in self.results[name].terms}
         return [name for name in self.averaged if name not in kept and name not in COEFFICIENTS]
