@@ -118,7 +118,7 @@ def test_what_cannot_be_aligned_is_said() -> None:
     t = clock(1000.0)
     angle, torque = sampled(4, "angle", t, 1e-3), sampled(4, "torque", t, 0.05)
     with pytest.raises(ValueError, match=r"align must be .* got 'always'"):
-        tvident.identify(angle, torque, sample_rate=1000, align="always")  # type: ignore[call-overload]
+        tvident.identify(angle, torque, sample_rate=1000, align="always")
     with pytest.raises(ValueError, match=r"must overlap; they share 0 s"):
         tvident.identify(angle, torque, t=(t, t + 100.0))
     with pytest.raises(ValueError, match=r"angle and torque alone; got velocity"):

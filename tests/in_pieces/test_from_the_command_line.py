@@ -17,7 +17,9 @@ IDENTIFY = ("identify", "--angle", "angle", "--torque", "torque", "--in-pieces",
 def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     rig = tvident.simulate_torsional_rig(duration=2.0)
-    np.save("rig.npy", np.rec.fromarrays([rig.time, rig.angle, rig.torque], names="time,angle,torque"))
+    recording = np.empty(rig.time.size, [("time", float), ("angle", float), ("torque", float)])
+    recording["time"], recording["angle"], recording["torque"] = rig.time, rig.angle, rig.torque
+    np.save("rig.npy", recording)
 
 
 def zarr_recording() -> None:

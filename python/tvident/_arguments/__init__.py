@@ -19,7 +19,15 @@ from tvident._arguments.numbers import (
 from tvident._arguments.paths import path_of
 from tvident._arguments.progress import Progress, reporter
 from tvident._arguments.ranges import finite, percentiles, told_once
-from tvident._arguments.sampling import check_power, check_window, length_given, sample_period, seconds, window_length
+from tvident._arguments.sampling import (
+    check_power,
+    check_window,
+    delay,
+    length_given,
+    sample_period,
+    seconds,
+    window_length,
+)
 from tvident._arguments.shown import nearest, shown
 from tvident._arguments.times import (
     NotUniformError,
@@ -55,6 +63,7 @@ __all__ = [
     "check_power",
     "check_window",
     "clock_changed",
+    "delay",
     "explained_in_words",
     "fields_of",
     "finite",

@@ -7,7 +7,7 @@ import re
 
 import numpy.typing as npt
 
-from tvident._arguments.numbers import positive_number, whole_number
+from tvident._arguments.numbers import finite_number, positive_number, whole_number
 from tvident._arguments.shown import shown
 from tvident._arguments.times import period_of_times
 from tvident._units import times_in_seconds
@@ -74,6 +74,19 @@ def seconds(name: str, value: str) -> float:
         units = ", ".join(_SECONDS)
         raise ValueError(f"{name} must be samples or a duration such as '0.2 s'; got {shown(value)}; units are {units}")
     return duration
+
+
+def delay(name: str, value: object) -> float:
+    """Return a time that may be negative, in seconds: from a number of them, or from a text with a unit such as ``"-2 ms"``."""
+    if not isinstance(value, str):
+        return finite_number(name, value)
+    match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*([a-zµ]+)\s*", value)
+    try:
+        return finite_number(name, float(match[1]) * _SECONDS[match[2]] if match else math.nan)
+    except (KeyError, ValueError):
+        raise ValueError(
+            f"{name} must be seconds, or a time such as '2 ms'; got {shown(value)}; units are {', '.join(_SECONDS)}"
+        ) from None
 
 
 def window_length(name: str, value: int | str, period: float, *, odd: bool) -> int:

@@ -47,10 +47,15 @@ def _in_plain_words() -> Iterator[None]:
         if error.errno == errno.EPIPE:
             raise  # whoever reads the output has had enough: click ends without a word
         _let_go_of_output()
-        if error.strerror is None:
-            raise click.ClickException(_line(error)) from None  # in words of ours
-        place = "the output" if error.filename is None else _line(error.filename)
-        raise click.ClickException(f"{place}: {_line(error.strerror)}") from None
+        raise click.ClickException(_of_system(error)) from None
+
+
+def _of_system(error: OSError) -> str:
+    """Return what the system says of a file, or what the library says of it in words of its own."""
+    if error.strerror is None:
+        return _line(error)
+    place = "the output" if error.filename is None else _line(error.filename)
+    return f"{place}: {_line(error.strerror)}"
 
 
 def _cure(error: click.ClickException) -> str:

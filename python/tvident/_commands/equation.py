@@ -46,9 +46,8 @@ def lag_of(text: str) -> float | Literal["auto"]:
         return float(text)
     except ValueError:
         pass
-    sign, magnitude = (-1.0, text.strip()[1:]) if text.strip().startswith("-") else (1.0, text)
     try:
-        return sign * arguments.seconds("lag", magnitude)
+        return arguments.delay("lag", text)
     except ValueError:
         raise click.UsageError(
             f"lag must be seconds, a time such as '2 ms', or 'auto'; got {text!r}; repair it"

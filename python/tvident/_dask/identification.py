@@ -31,7 +31,7 @@ def identify(
     damping: str | float | None = None,
     stiffness: str | float | None = None,
     terms: Sequence[GivenTerm] | None = None,
-    lag: float | None = None,
+    lag: float | str | None = None,
     quantisation: float | None = None,
     weights: Any = None,
     nan_policy: arguments.RowPolicy = "omit",

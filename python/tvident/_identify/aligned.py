@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +13,7 @@ import numpy.typing as npt
 from tvident._identify.data import Data
 
 Numbers: TypeAlias = npt.NDArray[np.float64]
-Align: TypeAlias = Literal["offset", "drift"] | float | None
+Align: TypeAlias = float | str | None
 
 Late: TypeAlias = tuple[float, float]
 """Seconds at the start of the record, and seconds more each second."""
@@ -55,9 +55,7 @@ class Aligned:
     moves: tuple[Late, ...] = ()
 
 
-def aligned(
-    data_of: Callable[[Late], Data], lag_of: Callable[[Data], tuple[float, float]], align: Literal["offset", "drift"]
-) -> Aligned:
+def aligned(data_of: Callable[[Late], Data], lag_of: Callable[[Data], tuple[float, float]], align: str) -> Aligned:
     """Return by how much the torque is late.
 
     Parameters

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
+from typing import TYPE_CHECKING, Any, Unpack, overload
 
 import numpy.typing as npt
 
@@ -76,7 +76,7 @@ def identify(
     velocity: npt.ArrayLike | None = None,
     acceleration: npt.ArrayLike | None = None,
     instrument: npt.ArrayLike | None = None,
-    lag: float | Literal["auto"] | None = None,
+    lag: float | str | None = None,
     quantisation: float | None = None,
     mask: npt.ArrayLike | None = None,
     weights: npt.ArrayLike | None = None,
@@ -174,10 +174,10 @@ def identify(
         then constant, and estimated by two-stage least squares: the instrument's past explains a motion, and rows of that
         motion multiply those of the recorded one. The summary has a test of exogeneity (Durbin, Wu, Hausman) and says if the instrument
         is weak.
-    lag : float or "auto", optional
-        Delay of the torque in seconds; it may be a fraction of a sample. ``"auto"``, in weak form: the lag nearest to zero at
-        which the torque's rate explains nothing more, with its standard error in ``settings["lag_stderr"]``; zero if the record does
-        not separate a lag from damping, as with motion at a single frequency.
+    lag : float, str or "auto", optional
+        Delay of the torque in seconds, or with a unit, as in ``"2 ms"``; it may be a fraction of a sample. ``"auto"``, in weak form: the
+        lag nearest to zero at which the torque's rate explains nothing more, with its standard error in ``settings["lag_stderr"]``; zero
+        if the record does not separate a lag from damping, as with motion at a single frequency.
     quantisation : float, optional
         Step to which the angle was rounded, in rad: an encoder's count. It is a lower bound for residuals in strong form, for the noise
         in weak form. By default it is estimated from the samples, as in :func:`tvident.fit_local_polynomials`, but not
@@ -215,12 +215,12 @@ def identify(
     phase : array_like or sequence of array_like, as the angle, optional
         Aligns trials: a number that grows from 0 to 1 within each, as through a cycle of gait, in place of the time. The result is that of
         the phase.
-    align : {"offset", "drift"} or float, optional
-        By how much stamps of the torque are late. A number: so many seconds. ``"offset"``: it is found from the equation itself, wherever
-        within a tenth of the record, and is in ``constants["clock_offset"]`` with its standard error, which those of parameters
-        contain. ``"drift"``: the clocks may run at different speeds, too; ``constants["clock_drift"]`` is by how many seconds stamps
-        become later each second. Weak form, a single record, angle and torque alone. As a lag, an offset is told from damping only where
-        the motion has several frequencies.
+    align : {"offset", "drift"}, float or str, optional
+        By how much stamps of the torque are late. A number: so many seconds, or ``"2 ms"``. ``"offset"``: it is found from the equation
+        itself, wherever within a tenth of the record, and is in ``constants["clock_offset"]`` with its standard error, which those of
+        parameters contain. ``"drift"``: the clocks may run at different speeds, too; ``constants["clock_drift"]`` is by how many seconds
+        stamps become later each second. Weak form, a single record, angle and torque alone. As a lag, an offset is told from damping only
+        where the motion has several frequencies.
     step : int, optional
         Every how many samples a result is wanted.
     nan_policy : {"omit", "propagate", "raise"}, optional

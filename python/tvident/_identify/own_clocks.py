@@ -130,6 +130,18 @@ class OwnClocks:
         return self.clocks.on_grid(self.clocks.torque, self.recorded[1], late, propagate=self.propagate)
 
 
+def _late(align: object) -> float:
+    """Return by how many seconds stamps are late."""
+    if not isinstance(align, str):
+        return arguments.finite_number("align", align)
+    try:
+        return arguments.delay("align", align)
+    except ValueError:
+        raise ValueError(
+            f"align must be 'offset' or 'drift', seconds, or a time such as '2 ms'; got {arguments.shown(align)}; use one of these"
+        ) from None
+
+
 def own_clocks(
     channels: Mapping[str, npt.ArrayLike | None],
     time: Mapping[str, Any],
@@ -154,10 +166,8 @@ def own_clocks(
     pairs = {name: value for name, value in given.items() if _is_pair(name, value)}
     if not pairs and align is None:
         return None
-    if align is not None and not isinstance(align, str):
-        align = arguments.finite_number("align", align)
-    elif align is not None:
-        arguments.one_of("align", align, ("offset", "drift"))
+    if align is not None and align not in ("offset", "drift"):
+        align = _late(align)
     others = [name for name, values in channels.items() if values is not None and name not in {"angle", "torque"}]
     if others or channels["angle"] is None:
         raise ValueError(

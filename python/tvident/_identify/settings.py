@@ -194,13 +194,13 @@ def resolve(
             )
     lag = asked["lag"]
     if isinstance(lag, tuple | list) and isinstance(form, WeakForm):
-        by_record["lag"] = [arguments.finite_number("lag", one) for one in lag]
+        by_record["lag"] = [arguments.delay("lag", one) for one in lag]
     elif arguments.is_word(lag, "auto") and isinstance(form, StrongForm):
         raise ValueError(
             "lag='auto' needs the weak form; got the strong form; use WeakForm, or give the lag that it finds, settings['lag']"
         )
     elif not arguments.is_word(lag, "auto"):
-        lag = arguments.finite_number("lag", lag)
+        lag = arguments.delay("lag", lag)
     has_form = not arguments.is_word(method, "auto")
     same_lag = earlier is not None and "lag" not in given and earlier.get("sample_rate") == sample_rate
     return Request(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypedDict
+from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict
 
 import numpy.typing as npt
 
@@ -31,7 +31,7 @@ class GivenArguments(TypedDict, total=False):
     velocity: npt.ArrayLike | None
     acceleration: npt.ArrayLike | None
     instrument: npt.ArrayLike | None
-    lag: float | Literal["auto"] | None
+    lag: float | str | None
     quantisation: float | None
     mask: npt.ArrayLike | None
     weights: npt.ArrayLike | None
