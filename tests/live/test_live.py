@@ -17,10 +17,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from click.testing import CliRunner
 
 import tvident
-from tvident._command_line import main
 from tvident._live import Inlet, LiveClock, Outlet
 
 SECONDS = float(os.environ.get("TVIDENT_LIVE", "10"))
@@ -31,10 +29,14 @@ RIG = tvident.simulate_torsional_rig(duration=2.0, seed=2)
 
 def run(text: str, *options: str) -> tuple[list[dict[str, Any]], str]:
     """Give the JSON lines and the words of a run on these lines."""
-    command = [sys.executable, "-c", "from tvident._command_line import main; main()", "live", "-", *options]
-    done = subprocess.run(command, input=text, capture_output=True, text=True, check=False, timeout=120)
+    done = session(text, *options)
     assert done.returncode == 0, done.stderr
     return [json.loads(line) for line in done.stdout.splitlines()], done.stderr
+
+
+def session(text: str, *options: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", "from tvident._command_line import main; main()", "live", "-", *options]
+    return subprocess.run(command, input=text, capture_output=True, text=True, check=False, timeout=120)
 
 
 @pytest.mark.slow
@@ -364,9 +366,7 @@ def test_stamps_of_another_rate_are_said_at_once() -> None:
 )
 def test_lines_without_the_channel_end_with_the_key_that_is_missing(lines: str, words: str) -> None:
     """Nothing but nulls went out, and the session ended well."""
-    done = CliRunner().invoke(
-        main, ["live", "-", "--angle", "angle", "--torque", "tork", "--sample-rate", "1000"], lines
-    )
-    assert done.exit_code == 1
+    done = session(lines, "--angle", "angle", "--torque", "tork", "--sample-rate", "1000")
+    assert done.returncode == 1
     assert words in done.stderr
     assert "lines must hold the channels; got none that does" in done.stderr
