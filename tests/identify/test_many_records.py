@@ -174,3 +174,21 @@ def test_records_within_records_are_refused_in_words() -> None:
         tvident.identify([angle, angle], [torque, torque], **{**options, "share": 5})
     with pytest.raises(TypeError, match="torque must hold numbers"):
         tvident.identify([angle, angle], nothing, **options)
+
+
+def test_an_error_of_one_record_names_it_and_one_of_progress_does_not() -> None:
+    rigs = [tvident.simulate_torsional_rig(duration=seconds) for seconds in (2.0, 1.0)]
+    angles, torques = [rig.angle for rig in rigs], [rig.torque for rig in rigs]
+    with pytest.raises(ValueError, match=r"must have the same shape; .* \(record 1 of 2\)"):
+        tvident.identify(angles, [torques[0], torques[1][:-1]], sample_rate=1000)
+
+    def progress(*_: int) -> None:
+        raise ValueError("mine")
+
+    with pytest.raises(ValueError, match=r"^mine$"):
+        tvident.identify(angles, torques, sample_rate=1000, progress=progress)
+    found = tvident.identify(angles, torques, sample_rate=1000)
+    with pytest.raises(IndexError, match="one of the 2 records, or a slice; got 2; count from 0"):
+        found[2]
+    with pytest.raises(TypeError, match="one of the 2 records, or a slice; got 'x'"):
+        cast("Any", found)["x"]

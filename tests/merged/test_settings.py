@@ -117,7 +117,7 @@ def test_settings_of_something_else_are_refused() -> None:
             TypeError, match=r"settings must be those of an earlier result with ensemble_axis= or dof_axis="
         ):
             identify(trials.angle, trials.torque, settings=settings_, **TRIALS)
-    with pytest.raises(TypeError, match="settings must be those of an earlier result"):
+    with pytest.raises(TypeError, match="settings must be those of one record; got those of trials or masses"):
         tvident.identify(trials.angle[0], trials.torque[0], sample_rate=1000, settings=found.settings)
     with pytest.raises(ValueError, match=r"the same elements; got 'damping', which there is not here"):
         identify(trials.angle, trials.torque, settings=found.settings, sample_rate=1000, dof_axis=0)

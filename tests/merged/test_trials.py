@@ -265,3 +265,16 @@ def test_what_cannot_be_done_is_refused_with_the_cure(options: dict[str, Any], m
     trials = simulated(3, 400, lambda t: 15 + 0 * t, seed=9)
     with pytest.raises(ValueError, match=message):
         identify(trials.angle, trials.torque, **{**OPTIONS, **options})
+
+
+def test_a_trial_of_which_nothing_is_left_is_named() -> None:
+    """A dead channel counted as one of the trials, without a word."""
+    rigs = [tvident.simulate_torsional_rig(duration=1.0, seed=seed) for seed in range(4)]
+    angle, torque = np.stack([rig.angle for rig in rigs]), np.stack([rig.torque for rig in rigs])
+    call: dict[str, Any] = {"sample_rate": 1000, "ensemble_axis": 0}
+    assert not any("tells nothing" in line for line in tvident.identify(angle, torque, **call).advice)
+    angle[2] = np.nan
+    found = tvident.identify(angle, torque, **call)
+    assert "trial 2 tells nothing: its samples are missing" in found.summary()
+    with pytest.raises(TypeError, match="settings must be those of one record; got those of trials or masses"):
+        tvident.identify(angle[0], torque[0], sample_rate=1000, settings=found.settings)

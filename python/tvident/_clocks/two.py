@@ -132,7 +132,7 @@ def _grid(times: Any, channel: npt.NDArray[np.number], time_unit: str | None) ->
         period = arguments.sample_period(samples, sample_rate=times)
         start = 0.0
     else:
-        times = times_in_seconds(times, time_unit)
+        times = times_in_seconds(times, time_unit, has_argument=True)
         try:
             period = arguments.sample_period(samples, t=times)
             arguments.check_no_lost_samples(times, channel)

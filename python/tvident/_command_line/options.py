@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -84,12 +85,24 @@ WORK = options_of(
     click.option("--progress/--no-progress", default=None, help="Show progress; by default on a terminal."),
 )
 
+
+class OutputPath(click.Path):
+    """A file, or a folder that holds arrays of Zarr."""
+
+    def convert(
+        self, value: str | os.PathLike[str], param: click.Parameter | None, ctx: click.Context | None
+    ) -> str | bytes | os.PathLike[str]:
+        """Return the path; refuse a folder of another kind."""
+        is_zarr = os.fspath(value).lower().endswith(".zarr")
+        return click.Path().convert(value, param, ctx) if is_zarr else super().convert(value, param, ctx)
+
+
 RUN = options_of(
     WORK,
     click.option(
         "-o",
         "--output",
-        type=click.Path(),  # a Zarr array is a folder
+        type=OutputPath(dir_okay=False),
         help="File for the results: .csv, .npz, .parquet, .h5, .mat or .xlsx, or - for CSV here.",
     ),
     click.option("--plot", type=click.Path(dir_okay=False), help="Picture of the results: PNG, PDF or SVG."),

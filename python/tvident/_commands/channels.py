@@ -16,29 +16,13 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import recordings
-from tvident._files import full_name, increasing_times, listed, printable, stated_rate, time_channels
+from tvident._files import BEGINNINGS, full_name, increasing_times, listed, printable, stated_rate, time_channels
 from tvident._units import Channel, UnitError, factor_between, named_unit
 
 _RATES = {"fs", "fsamp", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency"}
 """What a sample rate is called beside channels, without blanks and lines."""
 
 _MOST_START = 4096
-_BEGINNINGS = {
-    b"PK\x03\x04": ".npz",
-    b"\x93NUMPY": ".npy",
-    b"PAR1": ".parquet",
-    b"ARROW1": ".feather",
-    b"\x89HDF": ".h5",
-    b"MATLAB": ".mat",
-    b"TDSm": ".tdms",
-    b"MDF     ": ".mf4",
-    b"XDF:": ".xdf",
-    b"\x89MCAP": ".mcap",
-    b"#ROSBAG": ".bag",
-    b"LabVIEW": ".lvm",
-    b"\x1f\x8b": ".csv.gz",
-}
-"""How files begin."""
 
 
 def channel_of(channels: recordings.Channels, name: str, file: str | None) -> npt.NDArray[Any]:
@@ -124,7 +108,7 @@ def _standard_input() -> recordings.Channels:
             shutil.copyfileobj(sys.stdin.buffer, file)
         with content.open("rb") as file:
             start = file.read(_MOST_START)
-        ending = next((ending for magic, ending in _BEGINNINGS.items() if start.startswith(magic)), ".csv")
+        ending = next((ending for magic, ending in BEGINNINGS.items() if start.startswith(magic)), ".csv")
         if ending == ".npz" and (b"xl/" in start or b"[Content_Types]" in start):
             ending = ".xlsx"
         named = content.rename(content.with_name(f"standard-input{ending}"))

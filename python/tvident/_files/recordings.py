@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import cast
 
 from tvident import _arguments as arguments
+from tvident._files.beginnings import cure_of_name
 from tvident._files.channels import Channels, FileError, FileWarning, Say
 from tvident._files.names import printable
 from tvident._files.unpacked import ending_of
@@ -136,7 +137,7 @@ def read(path: str | Path) -> Channels:
     except FileError as error:
         ending = ending_of(path)
         kind = FORMATS[ending.lower()].name if ending.lower() in FORMATS else ending
-        raise FileError(f"{place}: cannot be read as {kind}: {error}") from None
+        raise FileError(f"{place}: cannot be read as {kind}: {error}{cure_of_name(path, ending, str(error))}") from None
     except PermissionError:
         raise FileError(f"{place}: may not be read; check its permissions") from None
     except OSError as error:

@@ -113,6 +113,11 @@ def arguments_of_result(earlier: Mapping[str, Any], given: Mapping[str, Any]) ->
         is_whole = _is_whole(earlier, kinds, known)
     except (KeyError, TypeError, ValueError):
         is_whole = False
+    if not is_whole and isinstance(earlier, Mapping) and "masses" in earlier:
+        raise TypeError(
+            "settings must be those of one record; got those of trials or masses that were merged; give ensemble_axis= or dof_axis= as "
+            "there, or leave settings out"
+        )
     if not is_whole:
         raise TypeError(
             f"settings must be those of an earlier result; got {arguments.shown(earlier)}; pass result.settings"

@@ -65,7 +65,8 @@ def identify_records(
     sizes = [int(np.size(call["torque"])) for call in calls]
     rounds = 2 + len(share) if share else 1
     total, before = rounds * sum(sizes), 0
-    with arguments.reporter(progress, "identification") as report:
+    with arguments.reporter(progress, "identification") as told:
+        report = None if told is None else _ProgressOfRecords(told)
 
         def every(change: Callable[[int], Mapping[str, Any]]) -> list[Identification]:
             nonlocal before
@@ -73,7 +74,13 @@ def identify_records(
             for place, call in enumerate(calls):
                 begin = before
                 tell = None if report is None else lambda done, _, begin=begin: report(begin + done, total)
-                found.append(single(**{**call, **change(place), "progress": tell}))
+                try:
+                    found.append(single(**{**call, **change(place), "progress": tell}))
+                except (ValueError, TypeError) as error:
+                    if report is not None and report.error is error:
+                        raise
+                    kind = ValueError if isinstance(error, ValueError) else TypeError
+                    raise kind(f"{error} (record {place} of {len(calls)})") from error
                 before += sizes[place]
             return found
 
@@ -99,6 +106,22 @@ def identify_records(
         with_shared(one, shared, {name: moved[name][place] for name in share}) for place, one in enumerate(known)
     ]
     return IdentifiedRecords(together, shared)
+
+
+class _ProgressOfRecords:
+    """What is told of the work done, and the error that it raised, which is none of a record."""
+
+    def __init__(self, report: Callable[[int, int], object]) -> None:
+        self._report = report
+        self.error: BaseException | None = None
+
+    def __call__(self, done: int, total: int) -> object:
+        """Tell, and keep what is raised."""
+        try:
+            return self._report(done, total)
+        except BaseException as error:
+            self.error = error
+            raise
 
 
 def _records(name: str, values: Any) -> int | None:

@@ -374,10 +374,10 @@ def sampled(
         implied = None if channel is None else arguments.implied_times(channel)
         if implied is None:
             raise TypeError("identify needs the sample period; got none; give sample_rate=, delta= or t=")
-        implied = times_in_seconds(implied)
+        implied = times_in_seconds(implied, has_argument=True)
         return arguments.sample_period(samples, t=implied), implied
     if time["t"] is not None:
-        time["t"] = times_in_seconds(time["t"], time_unit)
+        time["t"] = times_in_seconds(time["t"], time_unit, has_argument=True)
     if time["delta"] is not None and axis.time != 1:
         time["delta"] = arguments.positive_number("delta", time["delta"]) * axis.time
     period = arguments.sample_period(samples, **time)

@@ -109,13 +109,13 @@ def identify_file(
     Notes
     -----
     With everything windowed in strong form, as with ``method="paper"``, the numbers are those of one call in memory, bit for bit, beside
-    missing samples too, as long as none has a weight.
+    missing samples too, as long as none has a weight and there is no lag.
 
-    In weak form, and with constants or weights in strong form, every piece is identified as a record of its own with neighbours on both
-    sides. What is left to be chosen is chosen once, from at most eight stretches of 65 536 samples spread over the recording; flags and
-    advice of these stretches are those of the record. The constants of all pieces are put together, each weighted by the inverse of its
-    variance, and the numbers of every piece are corrected for the difference of its own constants. Where pieces differ by more than
-    chance, constants stay those of the pieces, and the record has the flag KIND_CONTRADICTED.
+    In weak form, and with constants, weights or a lag in strong form, every piece is identified as a record of its own with neighbours on
+    both sides. What is left to be chosen is chosen once, from at most eight stretches of 65 536 samples spread over the recording; flags
+    and advice of these stretches are those of the record. The constants of all pieces are put together, each weighted by the inverse of its
+    variance, and the numbers of every piece are corrected for the difference of its own constants. Where pieces differ by more than chance,
+    constants stay those of the pieces, and the record has the flag KIND_CONTRADICTED.
 
     Equations (2) to (4), (8) and (9) of the paper. The cost is that of :func:`identify`, in strong form about 60 ns a sample and thread,
     and that of writing and reading the results once more.

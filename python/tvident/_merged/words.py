@@ -50,10 +50,23 @@ def words_of(result: Any, merging: Merging, scatter: Mapping[str, float]) -> Wor
                 f"trials do not share {name}: it scatters by {spread:.3g} from trial to trial, {factor**0.5:.1f} times what noise "
                 "explains, and its standard errors are larger by as much; look at trial_spread"
             )
+    advice += _without_equations(result.trial_spread)
     for name, verdict in result.identifiable.items():
         if not verdict:
             advice.append(f"{name} cannot be known: {verdict.reason}")
     return Words(tuple(dict.fromkeys(reasons)), tuple(dict.fromkeys(advice)))
+
+
+def _without_equations(spread: Mapping[str, tuple[Any, Any]]) -> list[str]:
+    """Return which trials tell nothing."""
+    if not spread:
+        return []
+    tells = np.any([np.isfinite(differences) for differences, _ in spread.values()], axis=0)
+    silent = [str(trial) for trial in np.flatnonzero(~tells)]
+    if not silent or len(silent) == tells.size:
+        return []
+    what = f"trial {silent[0]} tells" if len(silent) == 1 else f"trials {', '.join(silent)} tell"
+    return [f"{what} nothing: its samples are missing, or nothing moves there; check the channels, or leave it out"]
 
 
 def _tested(result: Any) -> list[str]:

@@ -18,7 +18,9 @@ from tvident._status import Status
 At: TypeAlias = float | str | dt.date | np.datetime64 | None
 """When a part of a result begins or ends: seconds, or a date."""
 
-Place: TypeAlias = int | slice | EllipsisType | Sequence[int] | npt.NDArray[np.bool_] | npt.NDArray[np.integer] | None
+RecordIndex: TypeAlias = (
+    int | slice | EllipsisType | Sequence[int] | npt.NDArray[np.bool_] | npt.NDArray[np.integer] | None
+)
 """What stands for records of a batch, as in NumPy's indexing."""
 
 _LISTS = ("lag_samples", "shown_noise")

@@ -9,7 +9,7 @@ from typing import TypeAlias, overload
 import numpy as np
 import numpy.typing as npt
 
-from tvident._arguments import with_error
+from tvident import _arguments as arguments
 from tvident._results.result import Identification
 from tvident._status import Status
 
@@ -179,7 +179,12 @@ class IdentifiedRecords(Sequence[Identification]):
     def __getitem__(self, place: int | slice) -> Identification | IdentifiedRecords:
         if isinstance(place, slice):
             return IdentifiedRecords(self._records[place], self._shared)
-        return self._records[place]
+        try:
+            return self._records[place]
+        except (IndexError, TypeError) as error:
+            raise type(error)(
+                f"an index must be the number of one of the {len(self)} records, or a slice; got {arguments.shown(place)}; count from 0"
+            ) from None
 
     def __len__(self) -> int:
         return len(self._records)
@@ -218,12 +223,15 @@ class IdentifiedRecords(Sequence[Identification]):
         --------
         Identification.summary : of one of the records.
         """
-        lines = [f"{name}, shared by {len(self)} records: {with_error(*one)}" for name, one in self.constants.items()]
+        lines = [
+            f"{name}, shared by {len(self)} records: {arguments.with_error(*one)}"
+            for name, one in self.constants.items()
+        ]
         lines += [f"  {line}" for line in self.advice]
         for place, record in enumerate(self._records):
             lines += ["", f"record {place}", record.summary()]
         return "\n".join(lines).lstrip("\n")
 
     def __repr__(self) -> str:
-        shared = ", ".join(f"{name} {with_error(*one)}" for name, one in self.constants.items())
+        shared = ", ".join(f"{name} {arguments.with_error(*one)}" for name, one in self.constants.items())
         return f"<tvident.IdentifiedRecords: {len(self)} records" + (f", shared: {shared}>" if shared else ">")

@@ -15,7 +15,16 @@ from tvident._results.curve import ExpandedParameter
 from tvident._results.estimates import Estimates
 from tvident._results.held_back import HeldBack
 from tvident._results.oscillator import Oscillator
-from tvident._results.parts import At, Place, chosen, in_batch, of_records, of_samples, samples_between, settings_of
+from tvident._results.parts import (
+    At,
+    RecordIndex,
+    chosen,
+    in_batch,
+    of_records,
+    of_samples,
+    samples_between,
+    settings_of,
+)
 from tvident._results.recorded import Recorded
 from tvident._results.scan import Scan
 from tvident._results.shown import Shown
@@ -294,7 +303,7 @@ class Identification(Shown):
     def __iter__(self) -> Iterator[Identification]:
         return (self[record] for record in range(self.inertia.shape[0] if self.inertia.ndim > 1 else 1))
 
-    def __getitem__(self, place: Place | tuple[Place, ...]) -> Identification:
+    def __getitem__(self, place: RecordIndex | tuple[RecordIndex, ...]) -> Identification:
         batch = self.inertia.shape[:-1]
         if not batch:
             raise TypeError("only a result of several records can be indexed; this has one; use result.between(t0, t1)")

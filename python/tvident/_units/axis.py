@@ -104,24 +104,28 @@ def _check_named(
     *,
     by: str = "its name",
     what: str = "what is computed from a series keeps the name",
+    has_argument: bool = True,
 ) -> None:
     """Refuse a unit that only a name or an attribute says, where the numbers may have been converted since."""
     wanted = system.units[name]
+    argument = (
+        f"give {name}_unit={unit!r}, or {name}_unit={wanted!r} if they were converted, or " if has_argument else ""
+    )
     if is_convertible(system, name, unit) and factor_to(system, name, unit, name=f"the {name}") != 1:
         raise UnitError(
             f"the {name} must say its unit where {by} says {unit!r}: {what}, so nobody knows "
-            f"whether the numbers still are; give {name}_unit={unit!r}, or {name}_unit={wanted!r} if they were converted, or pass "
-            f".to_numpy() in {wanted}"
+            f"whether the numbers still are; {argument}pass .to_numpy() in {wanted}"
         )
 
 
-def times_in_seconds(t: Any, time_unit: str | None = None) -> Any:
-    """Return times in seconds where they have another unit, and otherwise as they are."""
+def times_in_seconds(t: Any, time_unit: str | None = None, *, has_argument: bool = False) -> Any:
+    """Return times in seconds where they have another unit, and otherwise as they are; messages name the argument where there is one."""
     unit = time_unit or unit_said(t)
     if not unit and getattr(getattr(t, "dtype", None), "kind", "") not in {"m", "M"}:
-        _check_named(ROTARY, "time", unit_named(t))
+        _check_named(ROTARY, "time", unit_named(t), has_argument=has_argument)
     if not time_unit and is_computed_label(t):
-        _check_named(ROTARY, "time", unit, by="an attribute", what="arithmetic keeps attributes")
+        what = "arithmetic keeps attributes"
+        _check_named(ROTARY, "time", unit, by="an attribute", what=what, has_argument=has_argument)
     factor = factor_to(ROTARY, "time", unit, name="the time")
     # What says another unit than the one that was given would be converted by whoever takes it next.
     is_plain = factor == 1 and (time_unit is None or not unit_said(t))
