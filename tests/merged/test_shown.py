@@ -122,3 +122,19 @@ def test_a_part_is_that_of_the_whole(made: Any, tmp_path: Path) -> None:
             getattr(part, name)()
     with pytest.raises(ValueError, match=r"a part must hold samples; got 9\.0 to None s"):
         result.between(9.0)
+
+
+def test_a_line_and_a_table_have_the_numbers() -> None:
+    rigs = [tvident.simulate_torsional_rig(duration=1.0, seed=seed) for seed in range(3)]
+    angle, torque = np.stack([rig.angle for rig in rigs]), np.stack([rig.torque for rig in rigs])
+    found = tvident.identify(angle, torque, sample_rate=1000, ensemble_axis=0)
+    line, page = repr(found), found._repr_html_()
+    assert line.startswith("<MergedIdentification of 3 trials of one mass, 1000 samples, 0.999 s: inertia 0.01")
+    for name in found.elements:
+        assert f"{name} {found.value(name)}" in line
+        assert f"<td>{name}</td>" in page
+        assert str(found.value(name)) in page
+    with pytest.raises(ValueError, match="phase must have as many trials as the angle; got 2 beside 3"):
+        tvident.identify(
+            list(angle), list(torque), sample_rate=1000, ensemble_axis=0, phase=[np.arange(1000) / 1000] * 2
+        )

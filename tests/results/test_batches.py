@@ -67,3 +67,10 @@ def test_names_of_records_stay(result: tvident.Identification) -> None:
 def test_an_index_that_names_no_record_hears_what_there_is(result: tvident.Identification, place: Any) -> None:
     with pytest.raises(IndexError, match=r"an index must name records of a batch of shape \(2, 3\); got .*between"):
         result[place]
+
+
+def test_notebooks_call_records_as_they_are_indexed(result: tvident.Identification) -> None:
+    """They said result[3], of a batch of two by three."""
+    page = result._repr_html_()
+    assert "<caption>record 0, 1</caption>" in page
+    assert "and 3 more records: result[1, 0]" in page

@@ -19,6 +19,7 @@ from tvident._merged.heterogeneity import differences_of, excess
 from tvident._merged.merging import Identifiable, Merging, Part
 from tvident._merged.oscillating import Oscillating
 from tvident._merged.reported import Reported
+from tvident._merged.short import as_html, in_one_line
 from tvident._merged.words import whose
 from tvident._results import samples_between, scan_of
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
@@ -380,5 +381,7 @@ class MergedIdentification(Oscillating, Reported):
         }
 
     def __repr__(self) -> str:
-        what = whose(self._merging.trials, max(self._merging.masses, 1))
-        return f"MergedIdentification({what}, {self.time.size} samples, {len(self.elements)} elements)"
+        return in_one_line(self, whose(self._merging.trials, max(self._merging.masses, 1)))
+
+    def _repr_html_(self) -> str:
+        return as_html(self, whose(self._merging.trials, max(self._merging.masses, 1)))

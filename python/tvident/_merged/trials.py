@@ -99,6 +99,10 @@ def trials_of(angle: Any, torque: Any, axis: int, *, phase: Any = None, mask: An
         if other is None:
             continue
         shapes, expected = [one.size for one in other], [one.size for one in angles]
+        if len(shapes) != len(expected):
+            raise ValueError(
+                f"{name} must have as many trials as the angle; got {len(shapes)} beside {len(expected)}; give one a trial"
+            )
         if shapes != expected:
             raise ValueError(
                 f"{name} must have a sample for every sample of the angle, trial by trial; got trials of "

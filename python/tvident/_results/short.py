@@ -29,11 +29,17 @@ def _good(result: Any) -> str:
     return f"{float(np.mean(result.trusted)):.1%} can be trusted" if result.status.size else "no samples"
 
 
+def _index(record: int, batch: tuple[int, ...]) -> str:
+    """Return the index of a record in the batch, as it is typed."""
+    return ", ".join(str(int(place)) for place in np.unravel_index(record, batch))
+
+
 def as_html(result: Any) -> str:
     """Return a table of the parameters, and below it what to do."""
     from html import escape  # noqa: PLC0415 - for notebooks alone
 
-    records = int(np.prod(result.inertia.shape[:-1], dtype=int))
+    batch = result.inertia.shape[:-1]
+    records = int(np.prod(batch, dtype=int))
     several = result.inertia.ndim > 1
     parts = [f"<p><b>{escape(short(result)[1:-1].partition(':')[0])}</b>, {escape(_good(result))}</p>"]
     for record in range(min(records, _RECORDS)):
@@ -42,12 +48,12 @@ def as_html(result: Any) -> str:
             one = result.value(name, record if several else None)
             words = escape(str(one))
             rows.append(f"<tr><td>{escape(name)}</td><td>{escape(one.kind)}</td><td>{words}</td></tr>")
-        head = f"<caption>record {record}</caption>" if several else ""
+        head = f"<caption>record {_index(record, batch)}</caption>" if several else ""
         parts.append(
             f"<table>{head}<tr><th>parameter</th><th>kind</th><th>value ± standard error</th></tr>{''.join(rows)}</table>"
         )
     if records > _RECORDS:
-        parts.append(f"<p>and {records - _RECORDS} more records: result[{_RECORDS}]</p>")
+        parts.append(f"<p>and {records - _RECORDS} more records: result[{_index(_RECORDS, batch)}]</p>")
     if result.advice:
         parts.append(f"<p>what to do</p><ul>{''.join(f'<li>{escape(line)}</li>' for line in result.advice)}</ul>")
     described = (in_words_of(result.units, line.strip()) for line in describe(result.status, result.record_status))
