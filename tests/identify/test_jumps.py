@@ -130,3 +130,20 @@ def test_windows_hardly_longer_than_a_narrow_test_function_hide_no_jump(seed: in
     assert np.sqrt(np.mean(off**2)) < ERROR * recording.stiffness.mean()
     inertia, error = found.constants["inertia"]
     assert abs(inertia - recording.inertia[0]) < 4 * error
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize(
+    ("seed", "duration"), [(7016, 20.25), (7007, 16.25), *long((7001, 16.25), (7009, 20.15), (7013, 20.27))]
+)
+def test_a_jump_just_before_the_end_loses_nothing_else(seed: int, duration: float) -> None:
+    """Nothing was found at all: whether the motion explains the torque was asked with windows that reach over jumps."""
+    recording = tvident.simulate_torsional_rig(
+        duration, seed=seed, pattern="square", angle_noise=(1e-4, 1e-3, 3e-3)[seed % 3]
+    )
+    result = identify(recording)
+    assert not result.record_status & Status.RANK_DEFICIENT
+    off = np.asarray(result.inertia) / recording.inertia - 1
+    assert np.median(np.abs(off)) < 0.005
+    off = np.asarray(result.stiffness) / recording.stiffness - 1
+    assert np.median(np.abs(off)) < 0.005

@@ -245,6 +245,7 @@ impl Fit {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::equation::rows::Rows;
     use crate::regression::simulated::{CONSTANTS, assert_near, model, rows, staged, white};
 
     /// Lines are followed exactly, and so are constants beside them.
@@ -309,6 +310,21 @@ mod tests {
             assert_near(*found, 3.0 * inverse, 1e-12);
         }
         assert_eq!(fit.covariance_of(&problem, 0..1, &fit.pooled, &covariance), found);
+    }
+
+    #[test]
+    fn constants_alone_are_found_in_one_piece_wherever_windows_would_end() {
+        let mut rows = rows(400, |_| [0.0, 0.0], 0.5);
+        let mut model = model();
+        (model.windowed, model.linear) = (Vec::new(), false);
+        let found = |rows: &Rows| {
+            let problem = model.problem(rows, &rows.rhs, 0.0, None);
+            let fit = staged(|stages| Fit::new(&problem, None, white(1.0), Instructions::Scalar, stages));
+            fit.expect("constants").pooled.values
+        };
+        let without = found(&rows);
+        rows.jumps = vec![100, 350];
+        assert_eq!(found(&rows), without);
     }
 
     #[test]

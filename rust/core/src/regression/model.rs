@@ -68,7 +68,8 @@ impl Model {
             constants: of(&self.constant, |regressor| &regressor.value),
             rhs,
             usable: &rows.usable,
-            jumps: &rows.jumps,
+            // What is constant does not jump.
+            jumps: if self.windowed.is_empty() { &[] } else { &rows.jumps },
             period: rows.period,
             roots: &rows.roots,
             noise: self.row_noise(rows, &self.rhs_noise(rows), noise),

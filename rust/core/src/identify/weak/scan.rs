@@ -21,6 +21,9 @@ use crate::weak_form::weak_rows::WeakRows;
 /// Half-widths that the spectra of a long record suggest which the widest test functions of a scan are long, at least.
 const WIDER: usize = 8;
 
+/// Reaches of a test function in a piece between jumps whose blocks count: two blocks as short as there may be.
+const LEAST_REACHES: usize = 4;
+
 impl Session<'_, '_, '_> {
     /// Scans the widths unless that was done, moves to the plateau where the test function that the spectra suggest is off it, and on to wider ones where
     /// windows follow noise. What was chosen and fitted `last`, with the same noise, tells what its test function is.
@@ -191,6 +194,8 @@ impl Session<'_, '_, '_> {
             let over = rows_over(jumps, &weak.kernels.values[2], times, count);
             weak.rows.exclude(over.filter_map(among));
             places = cut(&places, jumps.iter().filter_map(|jump| among(row_from(jump.sample, times))));
+            // What is too short for blocks of its own says nothing, and against nothing.
+            places.retain(|place| place.len() >= LEAST_REACHES * weak.reach());
         }
         Ok((weak, places))
     }

@@ -138,11 +138,18 @@ impl Session<'_, '_, '_> {
             let Some(whole) = whole else { return Ok(None) };
             return residuals(&problem, &whole, &mut self.stages).map(Some);
         };
-        let fit = Fit::with_leave_gap_out(&problem, scale, expected, instructions, &mut self.stages)?;
-        let Some(left) = fit.as_ref().and_then(|fit| left_of_rows(&problem, scale, fit)) else { return Ok(None) };
-        let left: Vec<Option<f64>> =
-            rows.usable.iter().enumerate().map(|(row, &usable)| if usable { left(row) } else { None }).collect();
-        Ok(Some((left.iter().map(|left| left.unwrap_or(0.0)).collect(), left.iter().map(Option::is_some).collect())))
+        // Between jumps there is no room for windows that are long because little changes: shorter ones tell as well what is chance.
+        let usable = rows.usable.iter().filter(|usable| **usable).count();
+        for &scale in decided.scales.iter().rev().filter(|one| one.span() <= scale.span()) {
+            let fit = Fit::with_leave_gap_out(&problem, scale, expected, instructions, &mut self.stages)?;
+            let Some(left) = fit.as_ref().and_then(|fit| left_of_rows(&problem, scale, fit)) else { continue };
+            let left: Vec<Option<f64>> =
+                rows.usable.iter().enumerate().map(|(row, &usable)| if usable { left(row) } else { None }).collect();
+            if 2 * left.iter().flatten().count() >= usable {
+                return Ok(Some(left.iter().map(|left| (left.unwrap_or(0.0), left.is_some())).unzip()));
+            }
+        }
+        Ok(None)
     }
 }
 
