@@ -271,9 +271,10 @@ def printed_step(seconds: Seconds) -> float:
 
 def irregular_at_sight(t: Any, samples: int) -> _core.RowTimes | None:
     """Return what the core saw of times that `period_of_times` would find not uniform, where one look at plain numbers shows it."""
-    if not (isinstance(t, np.ndarray) and t.dtype == np.float64 and t.shape == (samples,)):
+    # A class of its own may hold a unit or a mask.
+    if type(t) is not np.ndarray or t.dtype != np.float64 or t.shape != (samples,):
         return None
-    seconds: Seconds = np.asarray(t)
+    seconds: Seconds = t
     seen = _core.RowTimes(seconds)
     return seen if _is_irregular(seconds, seen) else None
 
