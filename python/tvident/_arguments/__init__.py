@@ -37,6 +37,7 @@ from tvident._arguments.times import (
     implied_times,
     irregular_at_sight,
     printed_step,
+    rounding,
     times_of,
 )
 from tvident._arguments.workers import worker_count
@@ -92,6 +93,7 @@ __all__ = [
     "real_array",
     "real_number",
     "reporter",
+    "rounding",
     "sample_period",
     "seconds",
     "shown",

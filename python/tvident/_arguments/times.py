@@ -192,7 +192,7 @@ def period_of_times(t: npt.ArrayLike, samples: int) -> float:
         raise _not_increasing(seconds)
     distance = np.abs(seconds - (seconds[0] + period * np.arange(samples)))
     largest = float(size.max())
-    if float(distance.max()) <= max(_JITTER * period, _rounding(kind) * largest):
+    if float(distance.max()) <= max(_JITTER * period, rounding(kind) * largest):
         return period
     slack = float(np.spacing(size.max().astype(kind)))
     quantum, bounds = _printed(seconds, period, slack, largest)
@@ -269,6 +269,11 @@ def printed_step(seconds: Seconds) -> float:
     return _quantum(seconds, float(np.spacing(largest)), largest) or 0.0
 
 
+def rounding(kind: np.dtype[Any]) -> float:
+    """Return how much times of a type may be rounded on their way, as a part of the largest."""
+    return _ROUNDINGS * float(np.spacing(np.ones(1, kind))[0])
+
+
 def irregular_at_sight(t: Any, samples: int) -> _core.RowTimes | None:
     """Return what the core saw of times that `period_of_times` would find not uniform, where one look at plain numbers shows it."""
     # A class of its own may hold a unit or a mask.
@@ -284,7 +289,7 @@ def _is_irregular(seconds: Seconds, seen: _core.RowTimes) -> bool:
     largest = seen.largest()
     if seconds.size < 3 or not seen.increase() or not largest < _COUNTABLE * _LONGEST:  # noqa: PLR2004 - one step is uniform
         return False
-    allowed = max(_JITTER * seen.length() / (seconds.size - 1), _rounding(seconds.dtype) * largest)
+    allowed = max(_JITTER * seen.length() / (seconds.size - 1), rounding(seconds.dtype) * largest)
     # Twice what is allowed: here distances are rounded in another way.
     if not seen.farthest() > 2 * allowed:
         return False
@@ -292,11 +297,6 @@ def _is_irregular(seconds: Seconds, seen: _core.RowTimes) -> bool:
     last = seconds[-_FEW_TIMES:] if abs(seconds[-1]) >= abs(seconds[0]) else seconds[:_FEW_TIMES]
     slack = float(np.spacing(largest))
     return all(_quantum(some, slack, largest) is None for some in (last, seconds))
-
-
-def _rounding(kind: np.dtype[Any]) -> float:
-    """Return how much times of a type may be rounded on their way, as a part of the largest."""
-    return _ROUNDINGS * float(np.spacing(np.ones(1, kind))[0])
 
 
 def _quantum(seconds: Seconds, slack: float, largest: float) -> float | None:

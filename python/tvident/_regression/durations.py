@@ -17,7 +17,9 @@ from tvident._units import times_in_seconds
 Array = npt.NDArray[np.float64]
 
 _SAME = 1e-9
-"""Rows that are less than this part of the duration beyond a window's border lie on it: rounding of times decides nothing."""
+"""Rows that are less than this part of the duration beyond a window's border lie on it, and those that rounding of times moves there."""
+
+_DOUBLE = np.dtype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -92,12 +94,15 @@ def spans_given(asked: AskedWindows, times: _core.RowTimes, regressors: int) -> 
             f"window_length must be at most the time of the record, {length:.6g} s; got {asked.window_length!r}; shorten it"
         )
     alignment = arguments.one_of("alignment", asked.alignment, ("centre", "trailing", "leading"))
-    slack = _SAME * duration
+    # A window holds its own row, and no neighbour for the sake of rounding.
+    rounding = min(_rounding(asked.t, times), times.steps()[0] / 2, duration / 2)
+    slack = max(_SAME * duration, rounding)
     # Full windows of uniform times hold as many rows wherever they are aligned: one border belongs to them.
     begin = {"centre": -duration / 2 - slack, "trailing": -duration + slack, "leading": -slack}[alignment]
     rows = _core.RowSpans(times, begin, duration)
     near, within = rows.near_ends(times.usual_step() / 2 + slack)
-    flags = np.where(within < duration * (1 - _SAME) - slack, np.uint16(Status.EDGE), np.uint16(0))
+    full = duration * (1 - _SAME) - slack
+    flags = np.where(within < full, np.uint16(Status.EDGE), np.uint16(0))
     at_least = None
     if asked.min_observations is not None:
         most = rows.most_and_fewest()[0]
@@ -108,8 +113,15 @@ def spans_given(asked: AskedWindows, times: _core.RowTimes, regressors: int) -> 
                 f"got {at_least}; use {regressors + 1} to {most}"
             )
     else:
-        flags = np.where(2 * within < duration * (1 - _SAME), flags | np.uint16(Status.INVALID), flags)
+        flags = np.where(2 * within < full - slack, flags | np.uint16(Status.INVALID), flags)
     return Spans(rows, near, flags.astype(np.uint16), at_least)
+
+
+def _rounding(t: npt.ArrayLike | None, times: _core.RowTimes) -> float:
+    """Return how far times may be rounded, in the type that they were given in."""
+    kind = getattr(t, "dtype", _DOUBLE)
+    is_coarser = isinstance(kind, np.dtype) and kind.kind == "f" and kind.itemsize < _DOUBLE.itemsize
+    return arguments.rounding(kind if is_coarser else _DOUBLE) * times.largest()
 
 
 def _steps_of(times: _core.RowTimes) -> str:

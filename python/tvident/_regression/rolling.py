@@ -142,7 +142,7 @@ def rolling_least_squares(
         Rows in a second, or seconds from row to row. One of these or ``t`` gives durations their meaning; numbers do not depend on it.
     t : array_like, shape (n,), optional
         Times of the rows, s, or dates. They give durations their meaning. Where they are not uniform, a window holds the rows within the
-        duration, as many as there are.
+        duration, as many as there are. A row that rounding of times moves off a border lies on it.
     loss : {"squares", "huber"}, optional
         ``"huber"``: residuals beyond 1.345 standard deviations (found from medians of blocks as long as windows) count linearly, so that
         spikes in ``b`` move parameters by little, however large they are. Spikes in ``A`` are no residuals: make them NaN.
