@@ -29,17 +29,39 @@ def test_intervals_of_a_curve_of_steps_hold_the_curve(family: str, seeds: range)
     assert np.mean(inside) > 0.88
 
 
-def of_steps(family: str, levels: list[float], error: float) -> np.ndarray:
-    """Return the variance of steps in the middle of each of eight cells."""
-    places = (np.arange(8) + 0.5) / 8
-    basis = Basis([Coordinate(places, np.zeros((2, 8)), (0.0, 1.0))], [FAMILIES[family]], [8])
-    factors = np.linalg.solve(basis.at([places]), np.array(levels))
-    return np.asarray(variance_of_steps(basis, factors, error * np.eye(8), [places]))
+def of_steps(family: str, levels: list[float], error: float, places: np.ndarray | None = None) -> np.ndarray:
+    """Return the variance of steps at some places, or in the middle of each cell."""
+    size = len(levels)
+    middles = (np.arange(size) + 0.5) / size
+    basis = Basis([Coordinate(middles, np.zeros((2, size)), (0.0, 1.0))], [FAMILIES[family]], [size])
+    factors = np.linalg.solve(basis.at([middles]), np.array(levels))
+    return np.asarray(variance_of_steps(basis, factors, error * np.eye(size), [middles if places is None else places]))
 
 
 @pytest.mark.parametrize("family", ["block_pulse", "haar"])
 def test_a_line_has_a_twelfth_of_the_square_of_its_change(family: str) -> None:
     np.testing.assert_allclose(of_steps(family, [3.0 * k for k in range(8)], 0.0), 9 / 12)
+
+
+@pytest.mark.parametrize(
+    ("family", "size"), [("block_pulse", 8), ("block_pulse", 10), ("block_pulse", 49), ("haar", 8)]
+)
+def test_borders_of_cells_belong_to_cells(family: str, size: int) -> None:
+    """Beyond the upper limit and at inner borders, where rounding decided, nothing was added."""
+    borders = np.arange(size + 1) / size
+    for places in (borders, np.nextafter(borders, 1).clip(0, 1), np.nextafter(borders, 0)):
+        np.testing.assert_allclose(of_steps(family, [3.0 * k for k in range(size)], 0.0, places), 9 / 12)
+
+
+@pytest.mark.parametrize("family", ["block_pulse", "haar"])
+def test_errors_at_the_upper_limit_are_those_beside_it(family: str) -> None:
+    rig = tvident.simulate_torsional_rig(duration=5, seed=53010, pattern="slider", angle_noise=1e-2)
+    expansion = tvident.Expansion(family, size=8, of=rig.slider_position)
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=1000, stiffness=expansion)
+    low, high = rig.slider_position.min(), rig.slider_position.max()
+    at = result.expansions["stiffness"].stderr_at
+    width = high - low
+    np.testing.assert_allclose(at([low, high]), at([low + 0.01 * width, high - 0.01 * width]), rtol=1e-9)
 
 
 @pytest.mark.parametrize("family", ["block_pulse", "haar"])

@@ -26,19 +26,22 @@ def variance_of_steps(basis: Basis, factors: Array, root: Array, places: Sequenc
     for number, (family, size) in enumerate(zip(basis.families, basis.sizes, strict=True)):
         cells = family.cells(size)
         if cells > 1:
-            added = added + _OF_A_LINE * _change(basis, factors, root, places, number, 1 / cells) ** 2
+            added = added + _OF_A_LINE * _change(basis, factors, root, places, number, cells) ** 2
     return added
 
 
-def _change(basis: Basis, factors: Array, root: Array, places: Sequence[Array], number: int, width: float) -> Array:
+def _change(basis: Basis, factors: Array, root: Array, places: Sequence[Array], number: int, cells: int) -> Array:
     """Return the change of a curve within the cells of one of its coordinates."""
     own = basis.at(places)
+    # As functions find it: the upper limit belongs to the last cell.
+    cell = np.floor(places[number] * cells).clip(0, cells - 1)
     changes, noises = [], []
-    for shift in (-width, width):
-        moved = places[number] + shift
-        is_inside = (moved >= 0) & (moved <= 1)
-        beside = basis.at([moved.clip(0, 1) if one == number else place for one, place in enumerate(places)]) - own
-        changes.append(np.where(is_inside, np.sign(shift) * (beside @ factors), np.nan))
+    for step in (-1, 1):
+        other = cell + step
+        is_inside = (other >= 0) & (other < cells)
+        middle = (other.clip(0, cells - 1) + 0.5) / cells
+        beside = basis.at([middle if one == number else place for one, place in enumerate(places)]) - own
+        changes.append(np.where(is_inside, step * (beside @ factors), np.nan))
         noises.append(np.where(is_inside, ((beside @ root) ** 2).sum(axis=1), np.nan))
     # Beyond the first and the last cell there is none: the change on the other side stands for both.
     before, behind = (np.where(np.isnan(one), other, one) for one, other in (changes, changes[::-1]))
