@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -222,3 +223,24 @@ def test_a_base_that_says_its_unit_is_converted() -> None:
     labelled.attrs["units"] = "m"
     with pytest.raises(ValueError, match="where only an attribute says 'm'"):
         found(labelled)
+    with pytest.raises(ValueError, match="where only its name says 'm'"):
+        found(pd.Series(base, name="base [m]"))
+    for name in ("base [mm]", "base [V]", "base"):
+        assert found(pd.Series(1e3 * base, name=name)) == pytest.approx(plain, rel=1e-9)
+
+
+def test_a_base_of_pint_is_converted_without_a_warning() -> None:
+    """NumPy took its numbers, and pint warned that their unit was lost."""
+    pint = pytest.importorskip("pint")
+    unit = pint.UnitRegistry()
+    masses = chain([lambda t: 12 + 0 * t], 3000, seed=8, driven=(0,), base=True)
+    given: dict[str, Any] = {"sample_rate": 1000, "dof_axis": 0, "angle_unit": "mm", "torque_unit": "N"}
+    base, found = np.asarray(masses.base), []
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for moving in (1e3 * base, base * unit.m, 1e3 * base * unit.mm):
+            structure = tvident.Chain(1, [("base", 0)], base=moving)
+            result = identify(1e3 * masses.angle, masses.torque, structure=structure, **given)
+            found.append(result.constants["stiffness_base_0"])
+    assert found[1] == pytest.approx(found[0], rel=1e-9)
+    assert found[2] == pytest.approx(found[0], rel=1e-9)

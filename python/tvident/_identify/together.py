@@ -23,8 +23,10 @@ from tvident._units import (
     axis_of,
     factor_to,
     has_unit_in_attributes,
+    is_convertible,
     scaled,
     times_in_seconds,
+    unit_named,
     unit_said,
 )
 
@@ -216,19 +218,31 @@ def _masses(angle: Any, torque: Any, options: Options, axis: Axis) -> tuple[None
 def _in_unit_of_angle(structure: Any, axis: Axis) -> Any:
     """Return a chain whose base says a unit of its own with a base in that of the angle, in which it is taken."""
     base = getattr(structure, "base", None)
-    unit = "" if base is None else unit_said(base)
+    if base is None:
+        return structure
+    said = unit_said(base)
+    named = "" if said else unit_named(base)
+    # A name that a product kept says nothing.
+    unit = named if is_convertible(axis.system, "angle", named) else said
     if not unit:
         return structure
     factor = factor_to(axis.system, "angle", unit, name="the base") / axis.angle
     if factor == 1:
         return structure
-    if has_unit_in_attributes(base):
+    if not said or has_unit_in_attributes(base):
+        by, keeps = (
+            ("an attribute", "arithmetic keeps attributes")
+            if said
+            else ("its name", "what is computed from a series keeps the name")
+        )
         raise UnitError(
-            f"the base must be in the unit of the angle where only an attribute says {unit!r}: arithmetic keeps attributes, so nobody "
+            f"the base must be in the unit of the angle where only {by} says {unit!r}: {keeps}, so nobody "
             f"knows whether the numbers still are; pass tvident.Channel(base, {unit!r}), or .to_numpy() if they were converted"
         )
-    each = [scaled(np.asarray(one), factor) for one in base] if isinstance(base, list | tuple) else None
-    return replace(structure, base=scaled(np.asarray(base), factor) if each is None else each)
+    numbers = arguments.plain("base", base)
+    is_list = isinstance(base, list | tuple)
+    each = [scaled(np.asarray(one), factor) for one in (numbers if is_list else [numbers])]
+    return replace(structure, base=each if is_list else each[0])
 
 
 def _check_nan(channels: Mapping[str, Sequence[Numbers]], weights: Numbers | None, options: Options) -> None:
