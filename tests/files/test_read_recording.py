@@ -166,7 +166,18 @@ def test_one_of_several_devices_is_asked_for(tmp_path: Path) -> None:
         ("Sampling interval = 2 ms", 500.0),
         ("Abtastzeit;2,5;ms", 400.0),
         ("Fréquence d'échantillonnage : 2 kS/s", 2000.0),
+        ("Sampling rate: 500Hz", 500.0),
+        ("Sampling rate: 0.5kHz", 500.0),
+        ("Sampling rate: 1e3 Hz", 1000.0),
+        ("Sampling interval: 2ms", 500.0),
+        ("Sample rate in Hz: 500", 500.0),
+        ("Abtastrate [1/s]: 500", 500.0),
+        ("fs = 500 Hz", 500.0),
+        ("FS = 100", None),  # full scale
+        ("FS = 100 V", None),
         ("Sampling rate: 1,000 Hz", None),  # a thousand, or one
+        ("Sampling rate: 1,000Hz", None),
+        ("Sampling rate: 500 Hz 2x", None),
         ("Sampling rate: 500 Hz, decimated by 2", None),
         ("Sampling interval: 2", None),
         ("Sampling rate: 500 rpm", None),
@@ -197,6 +208,19 @@ def test_a_sample_rate_that_lines_above_the_numbers_state_is_used(
     assert f"it may be --sample-rate {rate:g}, as the file says: '" in asked.stderr
     listed = CliRunner().invoke(main, ["info", "x.csv"])
     assert f"no channel holds times; it may be --sample-rate {rate:g}" in listed.stdout
+
+
+def test_a_sample_rate_below_the_numbers_is_not_stated_above_them(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    numbers = "angle,torque\n1,2\n2,0\n1,1\n"
+    path.write_text(f"{numbers}# Sampling rate: 500 Hz\n", encoding="utf-8")
+    with pytest.raises(ValueError, match="a sample rate needs a channel of times"):
+        _ = tvident.read_recording(path).sample_rate
+    path.write_text(f"# Sampling rate: 500 Hz\n{numbers}# Sampling rate: 100 Hz\n", encoding="utf-8")
+    assert tvident.read_recording(path).sample_rate == 500
+    # Lines above the numbers may be many.
+    path.write_text("# Sampling rate: 500 Hz\n" + 300 * "# x\n" + numbers, encoding="utf-8")
+    assert tvident.read_recording(path).sample_rate == 500
 
 
 def test_times_are_believed_rather_than_what_stands_above_them(tmp_path: Path) -> None:

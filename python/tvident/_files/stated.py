@@ -10,6 +10,7 @@ from pathlib import Path
 
 from tvident._files.cells import decimal_sign, number
 from tvident._files.channels import FileError
+from tvident._files.dialect import dialect_of
 from tvident._files.names import printable
 from tvident._files.recordings import PACKED, PLAIN
 from tvident._files.text import read_start
@@ -20,15 +21,21 @@ _SEARCHED = 100
 """Lines that are looked at."""
 
 _RATE = re.compile(
-    r"\W*(?:(?:sampl(?:e|ing)|acquisition|scan|logging)[ _.-]?(?:rate|freq(?:uency|\.)?)|fs|abtast(?:rate|frequenz)|mess(?:rate|frequenz)"
+    r"\W*(?:(?:sampl(?:e|ing)|acquisition|scan|logging)[ _.-]?(?:rate|freq(?:uency|\.)?)|(?P<short>fs)"
+    r"|abtast(?:rate|frequenz)|mess(?:rate|frequenz)"
     r"|fr[ée]quence d['\u2019](?:[ée]chantillonnage|acquisition)|frecuencia de muestreo|frequenza di campionamento)\b",
     re.IGNORECASE,
 )
+"""A short name may mean another thing, as full scale: its unit tells."""
+
 _PERIOD = re.compile(
     r"\W*(?:(?:sampl(?:e|ing)|scan|logging)[ _.-]?(?:interval|period)|abtast(?:intervall|periode|zeit)|dt|delta[ _]?t"
     r"|p[ée]riode d['\u2019][ée]chantillonnage|per[ií]odo de muestreo|periodo di campionamento)\b",
     re.IGNORECASE,
 )
+_BEFORE_UNIT = r"(?<=\d)(?!e[+-]?\d)(?=[^\W\d_])"
+"""Where a unit follows its number without a blank, as in 500Hz."""
+
 _BEHIND_NAME = re.compile(r"(?:[\[(][^\])]*[\])])?\s*,")
 _A_SECOND = re.compile(r"(k?)(?:sa?|samples?|scans?)(?:/s|/sec|ps)", re.IGNORECASE)
 """Units that count samples in a second, as kS/s."""
@@ -50,7 +57,16 @@ def stated_rate(path: Path) -> StatedRate | None:
         lines = read_start(path).split("\n")[:_SEARCHED]
     except (OSError, FileError, UnicodeError):
         return None
-    return _stated_in(lines)
+    return _stated_in(_above_numbers(lines))
+
+
+def _above_numbers(lines: list[str]) -> list[str]:
+    """Return the lines above the first one of numbers; all where none is."""
+    try:
+        dialect = dialect_of(lines, lambda _: None)
+    except FileError:
+        return lines
+    return lines if dialect is None else lines[: dialect.first]
 
 
 def _stated_in(lines: Iterable[str]) -> StatedRate | None:
@@ -69,12 +85,16 @@ def _rate_in(line: str) -> float | None:
         rest = line[said.end() :].strip()
         # A comma behind the name separates cells, as further ones then do; others may be decimal signs.
         between = r"[\s:;=\",]+" if _BEHIND_NAME.match(rest) else r"[\s:;=\"]+"
-        cells = [one.strip("[](){}") for one in re.split(between, rest)]
-        numbers = {cell: number(cell, comma=True) for cell in cells if cell[:1].isdigit()}
-        units = {cell for cell in cells if cell and cell not in numbers}
+        cells = [one.strip("[](){}") for one in re.split(f"{between}|{_BEFORE_UNIT}", rest, flags=re.IGNORECASE)]
+        numbers = {
+            cell: value for cell in cells if (value := number(cell, comma=True)) is not None and cell[:1].isdigit()
+        }
+        units = {cell for cell in cells if cell and cell not in numbers and cell.lower() != "in"}
         values = set(numbers.values())
         value = values.pop() if len(values) == 1 else None
         if value is None or not value > 0 or any(decimal_sign(cell) == "?" for cell in numbers) or len(units) > 1:
+            return None
+        if said.groupdict().get("short") and not units:
             return None
         return _per_second(value, next(iter(units), ""), is_rate=is_rate)
     return None
