@@ -277,6 +277,10 @@ def test_nothing_is_lost_and_what_is_dropped_is_said(
             "t;x\n" + "1,234;2,345\n" * 4 + "1,235;1.5\n",
             "the ',' in line 2 may be a decimal sign or separate thousands, as in 9",
         ),
+        (
+            "t;x\n" + "1,234;2,345\n" * 4 + "1.234;1.235\n" * 2 + "1,5;2\n",
+            r"the '\.' in line 6 may be a decimal sign or separate thousands, as in 4 numbers, and 1 with",
+        ),
         ("t;x\n0;1.234,5\n1;2.5\n", "one decimal sign; line 2 has a comma and line 3 a point"),
     ],
 )
@@ -284,6 +288,14 @@ def test_what_may_mean_two_things_is_refused(tmp_path: Path, content: str, messa
     (tmp_path / "x.csv").write_text(content)
     with pytest.raises(recordings.FileError, match=message):
         recordings.read(tmp_path / "x.csv")
+
+
+def test_numbers_with_the_decimal_sign_do_not_make_thousands_doubtful(tmp_path: Path) -> None:
+    """Nine numbers were counted against the comma of `1,5`, eight of which have commas."""
+    (tmp_path / "x.csv").write_text("t;x\n" + "1,234;2,345\n" * 4 + "1,5;1.234\n")
+    found = recordings.read(tmp_path / "x.csv")
+    assert list(found["t"]) == [1.234] * 4 + [1.5]
+    assert list(found["x"]) == [2.345] * 4 + [1234]
 
 
 def test_minus_signs_of_word_processors(tmp_path: Path) -> None:

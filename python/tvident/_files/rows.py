@@ -207,8 +207,7 @@ class Rows:
                 clear = is_clear.search(bare)
                 known, place = (self._doubtful, bare.index(sign)) if clear is None else (self._signs, clear.start())
                 known[sign] = known[sign] or self._line + 1 + bare.count("\n", 0, place)
-        if d.decimal is not None:
-            self._clear_count += bare.count(d.decimal)
+            self._clear_count += len(is_clear.findall(bare)) if sign == d.decimal else 0
         for column, kind in enumerate(d.kinds):
             if kind == "nothing" and np.isfinite(found[:, column]).any():
                 if column in self._remarks:
@@ -402,6 +401,8 @@ class Rows:
             return
         if sign == "?":
             sign = "," if "," in cell else "."
+            if sign == self._dialect.decimal:
+                return
             self._doubtful[sign] = self._doubtful[sign] or place
             self._doubtful_count += 1
         else:
