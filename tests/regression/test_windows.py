@@ -189,6 +189,14 @@ def test_weights_that_fade_stay_exact_and_errors_hold(alignment: Alignment) -> N
             "half_life must go with uniform times",
         ),
         (
+            {"window_length": "1 us", "t": np.arange(100.0) ** 1.1, "min_observations": 4},
+            "must hold more rows than the 2 regressors; got '1 us', and 1 rows in the fullest window; lengthen it",
+        ),
+        (
+            {"A": np.ones((3, 3)), "b": np.ones(3), "window_length": "4 s", "t": np.array([0, 1, 5.0])},
+            "must hold more rows than the 3 regressors; got '4 s', and 2 rows",
+        ),
+        (
             {"window_length": "900 s", "t": np.arange(100.0) ** 1.1},
             "at most the time of the record, 156.* got '900 s'",
         ),
@@ -233,8 +241,13 @@ def test_windows_of_a_duration_hold_the_rows_within(
     missing = generator.random(n) < lost
     b[missing] = np.nan
     asked = max(least, p + 1) if least is not None and jitter < 1 else None
-    found = tvident.rolling_least_squares(A, b, "20 s", t=t, alignment=alignment, min_observations=asked)
     before = {"centre": duration / 2, "trailing": duration, "leading": 0.0}[alignment]
+    ends = np.arange(n) + 1 if alignment == "trailing" else np.searchsorted(t, t - before + duration)
+    if (ends - np.searchsorted(t, t - before)).max() <= p:
+        with pytest.raises(ValueError, match=f"window_length must hold more rows than the {p} regressors; got '20 s'"):
+            tvident.rolling_least_squares(A, b, "20 s", t=t, alignment=alignment, min_observations=asked)
+        return
+    found = tvident.rolling_least_squares(A, b, "20 s", t=t, alignment=alignment, min_observations=asked)
     for row in {0, n - 1, *generator.integers(n, size=30).tolist()}:
         begin = t[row] - before
         since = t - t[row]

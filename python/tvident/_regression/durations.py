@@ -100,12 +100,17 @@ def spans_given(asked: AskedWindows, times: _core.RowTimes, regressors: int) -> 
     # Full windows of uniform times hold as many rows wherever they are aligned: one border belongs to them.
     begin = {"centre": -duration / 2 - slack, "trailing": -duration + slack, "leading": -slack}[alignment]
     rows = _core.RowSpans(times, begin, duration)
+    most = rows.most_and_fewest()[0]
+    if most <= regressors:
+        raise ValueError(
+            f"window_length must hold more rows than the {regressors} regressors; got {asked.window_length!r}, and {most} rows in the "
+            "fullest window; lengthen it"
+        )
     near, within = rows.near_ends(times.usual_step() / 2 + slack)
     full = duration * (1 - _SAME) - slack
     flags = np.where(within < full, np.uint16(Status.EDGE), np.uint16(0))
     at_least = None
     if asked.min_observations is not None:
-        most = rows.most_and_fewest()[0]
         at_least = arguments.whole_number("min_observations", asked.min_observations)
         if not regressors < at_least <= most:
             raise ValueError(
@@ -151,7 +156,7 @@ def solved(
     found = solve(
         regressors.T,
         columns.T,
-        {"rows": max(p + 1, spans.most), "alignment": "leading", "at_least": spans.at_least, "half_life": None},
+        {"rows": spans.most, "alignment": "leading", "at_least": spans.at_least, "half_life": None},
         weights=weights,
         spans=spans.rows,
     )

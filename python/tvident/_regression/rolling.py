@@ -239,7 +239,7 @@ def rolling_least_squares(
         spans = spans_given(asked, times, count)
         check_uniform(times, is_correlated=is_correlated, is_robust=is_robust)
         # Of what follows only what does not depend on the number of rows is used.
-        asked = replace(asked, window_length=max(count + 1, spans.most), t=None, min_observations=None)
+        asked = replace(asked, window_length=spans.most, t=None, min_observations=None)
     windows = windows_given(asked, rows, count)
     lag = lags_given(lags, windows, is_correlated=is_correlated, is_robust=is_robust)
     every = arguments.whole_number("step", step, least=1)
