@@ -116,13 +116,13 @@ def test_windows_of_a_duration_equal_a_direct_least_squares_fit(
         rows = every[(noise[every] > 0) & ~missing[every]]
         status = Status(int(found.status[place]))
         assert (Status.EDGE in status) == (within < duration)
+        assert (Status.GAP in status) == (asked is not None and bool(missing[every].any()))
         spoilt = asked is None and bool(missing[every].any())
         if spoilt or rows.size < (asked or p + 1) or (asked is None and 2 * within < duration):
             assert Status.INVALID in status
             for name in ("params", "stderr", "rss", "rsquared", "residuals"):
                 assert np.isnan(getattr(found, name)[place]).all(), name
             continue
-        assert (Status.GAP in status) == bool(missing[every].any())
         is_constant = has_constant or np.ptp(A[(noise > 0) & ~missing, 0]) == 0
         expected = fitted(A[rows], b[rows], noise[rows], centred=is_constant)
         if expected["condition"] > 1e4:

@@ -164,7 +164,7 @@ def solved(
     status[spans.near] |= spans.flags
     few = spans.rows.fewer_than(p + 1 if spans.at_least is None else spans.at_least)
     code = Status.INVALID if spans.at_least is not None else Status.INVALID | Status.RANK_DEFICIENT
-    status[few] = status[few] & np.uint16(Status.EDGE) | np.uint16(code)
+    status[few] = status[few] & np.uint16(Status.EDGE | Status.GAP) | np.uint16(code)
     invalid = spans.flags & Status.INVALID != 0
     status[spans.near[invalid]] = spans.flags[invalid]
     out = np.union1d(few, spans.near[invalid])
