@@ -11,6 +11,7 @@ const PIECE: usize = 1 << 10;
 
 /// Steps that tell the usual one, spread over the record.
 const LOOKED_AT: usize = 1 << 12;
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Times of rows in seconds, and what all of them show.
 #[derive(Clone, Debug)]
@@ -75,7 +76,10 @@ impl RowTimes {
     pub fn usual_step(&self) -> f64 {
         let all = self.since.len().saturating_sub(1);
         let count = all.min(LOOKED_AT);
-        let places = (0..count).map(|step| step * all / count);
+        // In golden sections, which no pattern of the steps falls in with.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of the steps")]
+        let section = |step: usize| ((step as f64 * GOLDEN).fract() * all as f64) as usize;
+        let places = (0..count).map(|step| if count == all { step } else { section(step) });
         let mut steps: Vec<f64> = places.map(|place| self.since[place + 1] - self.since[place]).collect();
         steps.sort_unstable_by(f64::total_cmp);
         match count {
@@ -227,6 +231,18 @@ mod tests {
         let times: Vec<f64> = (0..40_000).map(|row| f64::from(row) + if row % 10 == 3 { 0.5 } else { 0.0 }).collect();
         assert!(of(&times).iter().all(|found| found.usual_step() == 1.0));
         assert!(of(&[0.0, 1.0, 4.0]).iter().all(|found| found.usual_step() == 2.0));
+        // Two of three steps are short, wherever steps are looked at.
+        for count in [2 * LOOKED_AT + 1, 3 * LOOKED_AT + 1, 3 * LOOKED_AT + 2] {
+            let mut time = 0.0;
+            let steps = (0..count).map(|row| if row % 3 == 0 { 3.0 } else { 0.125 });
+            let times: Vec<f64> = steps
+                .map(|step| {
+                    time += step;
+                    time
+                })
+                .collect();
+            assert!(of(&times).iter().all(|found| found.usual_step() == 0.125), "{count}");
+        }
         assert!(of(&[0.0]).iter().all(|found| found.usual_step() == 0.0));
     }
 }
