@@ -187,18 +187,12 @@ LEAST_WIDTH = 40
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", [11, *long(12, 13, 14)])
 @pytest.mark.parametrize("pattern", ["slider", "constant"])
-@pytest.mark.parametrize(("cutoff", "order", "both"), [(20.0, 2, False), (50.0, 2, False), (50.0, 1, True)])
-def test_noise_that_was_low_passed_is_not_taken_for_motion(
-    cutoff: float, order: int, both: bool, pattern: Pattern, seed: int
-) -> None:
-    """It made test functions of 9 to 47 samples seem best, and windows as short, in which nothing is known."""
+@pytest.mark.parametrize("cutoff", [20.0, 50.0])
+def test_noise_that_was_low_passed_is_not_taken_for_motion(cutoff: float, pattern: Pattern, seed: int) -> None:
+    """It made test functions of 9 to 33 samples seem best, and windows as short, in which nothing is known."""
     recording = tvident.simulate_torsional_rig(seed=seed, pattern=pattern, angle_noise=1e-3)
-    kernels = butter(order, cutoff, fs=RATE)
-    torque = lfilter(*kernels, recording.torque) if both else recording.torque
-    result = tvident.identify(lfilter(*kernels, recording.angle), torque, sample_rate=RATE)
+    angle = lfilter(*butter(2, cutoff, fs=RATE), recording.angle)
+    result = tvident.identify(angle, recording.torque, sample_rate=RATE)
     assert result.settings["window_length"] > LEAST_WIDTH
     assert not result.record_status & Status.WINDOW_LIMIT
-    if both:
-        assert abs(result.value("inertia").value / np.mean(recording.inertia) - 1) < HELD
-    else:
-        assert result.record_status & Status.LAG_SUSPECTED
+    assert result.record_status & Status.LAG_SUSPECTED

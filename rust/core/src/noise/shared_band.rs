@@ -1,7 +1,7 @@
 //! The band in which two channels show the same motion.
 //!
-//! The noise of a channel that was low-passed falls with the frequency, so that it cannot be read at the highest ones: it looks like motion. What is
-//! motion the other channel shows as well. So the band ends where the coherence of both is no more than chance.
+//! The noise of an angle that was low-passed falls with the frequency, so that it cannot be read at the highest ones: it looks like motion. What is
+//! motion the torque shows as well. So the band ends where the coherence of both is no more than chance.
 
 use crate::noise::coherence::spectra;
 use crate::record::samples::Samples;

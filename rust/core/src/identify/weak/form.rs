@@ -309,9 +309,9 @@ fn settled(
 ) -> Result<WeakIdentified, Error> {
     let step = options.quantisation.unwrap_or_else(|| quantisation_step(record.angle));
     let is_rounding = step > 0.0 && channel_noise[0] <= HARDLY_MORE * rounding_variance(step, record.weights);
-    let low_passed = || record.noise.is_none() && [record.angle, record.torque].into_iter().any(is_low_passed);
-    let shared_until =
-        (options.half_width.is_none() && low_passed()).then(|| shared_until(record.angle, record.torque)).flatten();
+    let is_alone = || is_low_passed(record.angle) && !is_low_passed(record.torque);
+    let is_chosen = options.half_width.is_none() && record.noise.is_none();
+    let shared_until = if is_chosen && is_alone() { shared_until(record.angle, record.torque) } else { None };
     // What looks like a pulse where samples are missing may be a loss that was not detected.
     let (mut pulses, mut calm, mut round) = (Vec::new(), Vec::new(), if whole { 0 } else { PULSE_ROUNDS });
     loop {
