@@ -278,3 +278,34 @@ def test_a_trial_of_which_nothing_is_left_is_named() -> None:
     assert "trial 2 tells nothing: its samples are missing" in found.summary()
     with pytest.raises(TypeError, match="settings must be those of one record; got those of trials or masses"):
         tvident.identify(angle[0], torque[0], sample_rate=1000, settings=found.settings)
+
+
+def test_every_trial_may_have_its_own_mask() -> None:
+    """Masks were refused as float64, which they were turned into."""
+    rigs = [tvident.simulate_torsional_rig(duration=1.0, seed=seed) for seed in range(4)]
+    angles, torques = [rig.angle for rig in rigs], [rig.torque for rig in rigs]
+    mask = np.ones((4, 1000), np.bool_)
+    mask[:, 300:340] = False
+    np.testing.assert_array_equal(
+        identify(angles, torques, mask=mask, **OPTIONS).stiffness,
+        identify(angles, torques, mask=mask[0], **OPTIONS).stiffness,
+    )
+    mask[2] = False
+    wrong = [*torques[:2], torques[2] + 5, torques[3]]
+    found = identify(angles, wrong, mask=mask, **OPTIONS).stiffness
+    for same in (mask, list(mask), mask.tolist(), list(mask[..., np.newaxis])):
+        np.testing.assert_allclose(identify(angles, torques, mask=same, **OPTIONS).stiffness, found, rtol=1e-12)
+    lengths = [1000, 900, 950, 1000]
+    angles, torques, wrong = (
+        [one[:length] for one, length in zip(each, lengths, strict=True)] for each in (angles, torques, wrong)
+    )
+    masks = [one[:length] for one, length in zip(mask, lengths, strict=True)]
+    np.testing.assert_allclose(
+        identify(angles, torques, mask=masks, **OPTIONS).stiffness,
+        identify(angles, wrong, mask=masks, **OPTIONS).stiffness,
+        rtol=1e-12,
+    )
+    with pytest.raises(ValueError, match="mask must have a sample for every sample of the angle, trial by trial"):
+        identify(angles, torques, mask=list(mask), **OPTIONS)
+    with pytest.raises(TypeError, match="mask must hold True and False; got float64"):
+        identify(angles, torques, mask=[1.0 * one for one in masks], **OPTIONS)

@@ -91,11 +91,8 @@ def trials_of(angle: Any, torque: Any, axis: int, *, phase: Any = None, mask: An
         If there is one record only, lengths of angle and torque differ, or a phase does not grow.
     """
     angles, torques = _records("angle", angle, axis), _records("torque", torque, axis)
-    for name, other in (
-        ("torque", torques),
-        ("phase", _optional("phase", phase, axis)),
-        ("mask", _masks(mask, axis, angles)),
-    ):
+    masks, phases = _masks(mask, angles), _optional("phase", phase, axis)
+    for name, other in (("torque", torques), ("phase", phases), ("mask", masks)):
         if other is None:
             continue
         shapes, expected = [one.size for one in other], [one.size for one in angles]
@@ -108,7 +105,6 @@ def trials_of(angle: Any, torque: Any, axis: int, *, phase: Any = None, mask: An
                 f"{name} must have a sample for every sample of the angle, trial by trial; got trials of "
                 f"{arguments.shown(shapes)} samples beside {arguments.shown(expected)}; cut them to the same"
             )
-    masks, phases = _masks(mask, axis, angles), _optional("phase", phase, axis)
     if phases is None:
         return Trials(angles, torques, masks, None, max(one.size for one in angles), None)
     checked = [_growing(place, np.asarray(one, np.float64)) for place, one in enumerate(phases)]
@@ -155,15 +151,16 @@ def _optional(name: str, values: Any, axis: int) -> list[Numbers] | None:
     return None if values is None else _records(name, values, axis)
 
 
-def _masks(mask: Any, axis: int, angles: Sequence[Numbers]) -> list[npt.NDArray[np.bool_]] | None:
+def _masks(mask: Any, angles: Sequence[Numbers]) -> list[npt.NDArray[np.bool_]] | None:
     """Return a mask for every trial; one of shape (n,) is that of all."""
     if mask is None:
         return None
-    one_for_all = not isinstance(mask, Sequence) and np.ndim(mask) == 1
-    given = (
-        [np.asarray(mask)] * len(angles) if one_for_all else _records("mask", [np.asarray(one) for one in mask], axis)
-    )
-    return [np.ascontiguousarray(arguments.mask("mask", one, one.shape)) for one in given]
+    given: Any
+    if isinstance(mask, Sequence) and mask and np.ndim(mask[0]) > 0:
+        given = [arguments.mask("mask", one, np.shape(one)[:1]) for one in mask]
+    else:
+        given = arguments.mask("mask", mask, (len(angles), max(one.size for one in angles)))
+    return [np.ascontiguousarray(one) for one in given]
 
 
 def _growing(place: int, phase: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
