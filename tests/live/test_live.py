@@ -361,6 +361,43 @@ def test_stamps_of_another_rate_are_said_at_once() -> None:
     assert not twice.comes_faster
 
 
+@pytest.mark.parametrize("every", [1, 5])
+def test_lines_that_come_twice_are_no_higher_rate(every: int) -> None:
+    """Where every line came twice, `--sample-rate 2001.022` was to be given."""
+    numbers = np.arange(4000)
+    order = np.repeat(numbers, np.where(numbers % every, 1, 2)).tolist()
+    clock, counted = LiveClock(1e-3), LiveClock(1e-3)
+    for number in order:
+        row = (number * 1e-3, math.sin(number), math.nan)
+        clock.rows(row)
+        counted.rows(row, float(number))
+        assert not clock.comes_faster
+        assert not counted.comes_faster
+    assert clock.repeated == pytest.approx(4000 / every, abs=20)
+    assert counted.repeated == 4000 / every
+    assert "samples more came" in "\n".join(clock.words())
+
+
+def test_buffers_whose_samples_are_equal_are_counted_whole() -> None:
+    clock = LiveClock(1 / 500)
+    for number in range(2000):
+        # At rest but for one sample of a buffer of eight.
+        clock.rows((number // 8 * 8e-3, float(number % 8 == 7), 0.0))
+    assert "give --sample-rate 100" in clock.comes_faster
+
+
+def test_what_came_twice_before_the_clock_was_set_says_nothing_of_the_rate() -> None:
+    """Two buffers of one stamp each look like a higher rate."""
+    clock = LiveClock(1e-3)
+    for number in range(4000):
+        clock.rows((number // 2 * 1e-3, float(number), 0.0))
+    assert clock.comes_faster
+    for number in range(300):
+        clock.rows((-100 + number // 150 * 0.15, float(number), 0.0))
+        assert not clock.comes_faster
+    assert clock.repeated > 1000
+
+
 @pytest.mark.parametrize(
     ("lines", "words"), [('{"angle": 1.0, "torque": 2.0}\n' * 5, "which has no 'tork'"), ("", "got none that does")]
 )

@@ -95,7 +95,9 @@ class LiveClock:
         self._next = 0
         self._expected = self._last = math.nan
         self._counter: int | None = None
-        self._begin, self._stamped = math.nan, 0
+        self._begin, self._stamped, self._same = math.nan, 0, 0
+        self._before: Row = (math.nan,) * 3
+        self._has_buffers, self._of_earlier_clock = False, 0
         self._highest = self._came = 0
         self.rate = Rate()
         self._newest = math.nan
@@ -106,7 +108,11 @@ class LiveClock:
         if math.isfinite(row[0]):
             self._begin = row[0] if math.isnan(self._begin) else self._begin
             self._stamped += 1
-            self._newest = row[0]
+            if row[0] == self._before[0]:
+                differs = any(abs(one - other) > 0 for one, other in zip(row[1:], self._before[1:], strict=True))
+                self._has_buffers |= differs
+                self._same += not differs
+            self._newest, self._before = row[0], row
         if counter is not None:
             return self._counted(row, counter)
         step = (row[0] - self._last) / self._seconds()
@@ -183,7 +189,8 @@ class LiveClock:
     def _jumped(self, stamp: float) -> list[Row]:
         """Begin anew with a clock that was set, and return what keeps windows from what was before."""
         self.jumps += 1
-        self._begin, self._stamped = stamp, 1
+        self._begin, self._stamped, self._same = stamp, 1, 0
+        self._of_earlier_clock = self.repeated
         self.rate, self._next, self._expected = Rate(), 0, stamp
         return [_apart(stamp)]
 
@@ -211,9 +218,12 @@ class LiveClock:
     @property
     def comes_faster(self) -> str:
         """What to say where stamps show a higher rate than the nominal one, by which samples seem to come twice; nothing elsewhere."""
-        if self._stamped < _ENOUGH or self.repeated < _MOST_REPEATED * self._stamped or self._newest <= self._begin:
+        # Lines that come again are no samples, but those of one buffer may be equal where nothing moves.
+        stamped = self._stamped - (0 if self._has_buffers else self._same)
+        repeated = self.repeated - self._of_earlier_clock
+        if stamped < _ENOUGH or repeated < _MOST_REPEATED * stamped or self._newest <= self._begin:
             return ""
-        rate = (self._stamped - 1) / (self._newest - self._begin)
+        rate = (stamped - 1) / (self._newest - self._begin)
         if rate < _FASTER / self._period:
             return ""
         nominal = 1 / self._period
