@@ -36,3 +36,7 @@ def test_an_offset_of_clocks_may_have_a_unit() -> None:
         ValueError, match="align must be 'offset' or 'drift', seconds, or a time such as '2 ms'; got 'x'"
     ):
         tvident.identify(RIG.angle, RIG.torque, t=(t, t), align="x")
+    for several in ([0.1, 0.2], np.array([0.1, 0.2]), np.array("offset")):
+        wrong: Any = several
+        with pytest.raises(TypeError, match="align must be a number; got"):
+            tvident.identify(RIG.angle, RIG.torque, t=(t, t), align=wrong)

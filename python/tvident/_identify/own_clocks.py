@@ -166,7 +166,7 @@ def own_clocks(
     pairs = {name: value for name, value in given.items() if _is_pair(name, value)}
     if not pairs and align is None:
         return None
-    if align is not None and align not in ("offset", "drift"):
+    if align is not None and not (isinstance(align, str) and align in {"offset", "drift"}):
         align = _late(align)
     others = [name for name, values in channels.items() if values is not None and name not in {"angle", "torque"}]
     if others or channels["angle"] is None:
