@@ -67,8 +67,8 @@ def test_a_recording_in_a_folder_is_not_replaced_either() -> None:
 
 def test_results_in_a_folder_are_replaced_by_those_of_another_run() -> None:
     pytest.importorskip("zarr")
-    for _ in range(2):
-        assert run(*IDENTIFY, "rig.npy", "-o", "out.zarr").returncode == 0
+    for output in ("out.zarr", "out.zarr", "out.zarr/"):  # with a slash as shells complete it
+        assert run(*IDENTIFY, "rig.npy", "-o", output).returncode == 0
     Path("mine.zarr").mkdir()
     done = run(*IDENTIFY, "rig.npy", "-o", "mine.zarr")
     assert done.returncode == 1

@@ -93,7 +93,7 @@ class OutputPath(click.Path):
         self, value: str | os.PathLike[str], param: click.Parameter | None, ctx: click.Context | None
     ) -> str | bytes | os.PathLike[str]:
         """Return the path; refuse a folder of another kind."""
-        is_zarr = os.fspath(value).lower().endswith(".zarr")
+        is_zarr = Path(value).suffix.lower() == ".zarr"
         return click.Path().convert(value, param, ctx) if is_zarr else super().convert(value, param, ctx)
 
 
