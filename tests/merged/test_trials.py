@@ -278,6 +278,9 @@ def test_a_trial_of_which_nothing_is_left_is_named() -> None:
     assert "trial 2 tells nothing: its samples are missing" in found.summary()
     with pytest.raises(TypeError, match="settings must be those of one record; got those of trials or masses"):
         tvident.identify(angle[0], torque[0], sample_rate=1000, settings=found.settings)
+    angle[1] = np.nan
+    words = "trials 1, 2 tell nothing: their samples are missing, or nothing moves there; check the channels, or leave them out"
+    assert words in tvident.identify(angle, torque, **call).advice
 
 
 def test_every_trial_may_have_its_own_mask() -> None:

@@ -65,8 +65,12 @@ def _without_equations(spread: Mapping[str, tuple[Any, Any]]) -> list[str]:
     silent = [str(trial) for trial in np.flatnonzero(~tells)]
     if not silent or len(silent) == tells.size:
         return []
-    what = f"trial {silent[0]} tells" if len(silent) == 1 else f"trials {', '.join(silent)} tell"
-    return [f"{what} nothing: its samples are missing, or nothing moves there; check the channels, or leave it out"]
+    one = len(silent) == 1
+    what = f"trial {silent[0]} tells" if one else f"trials {', '.join(silent)} tell"
+    theirs, them = ("its", "it") if one else ("their", "them")
+    return [
+        f"{what} nothing: {theirs} samples are missing, or nothing moves there; check the channels, or leave {them} out"
+    ]
 
 
 def _tested(result: Any) -> list[str]:
