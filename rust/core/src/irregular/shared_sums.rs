@@ -57,16 +57,7 @@ impl<S: Lanes> ChebyshevSums<S> {
             pair.raise_lower(simd);
             std::mem::swap(&mut pair.lower, &mut pair.upper);
         }
-        let (moments, last_moment) = higher.as_chunks_mut::<2>();
-        for moments in moments {
-            add_all(simd, &mut moments[0], &pair.lower);
-            pair.raise_lower(simd);
-            add_all(simd, &mut moments[1], &pair.upper);
-            pair.raise_upper(simd);
-        }
-        if let [moment] = last_moment {
-            add_all(simd, moment, &pair.lower);
-        }
+        pair.add_each(simd, higher);
     }
 }
 
@@ -87,6 +78,21 @@ impl<S: Lanes, const N: usize> NeighbouringDegrees<S, N> {
             upper[n] = simd.mul_f64s(times[n], weights[n]);
         }
         Self { twice, lower: *weights, upper }
+    }
+
+    /// Adds each polynomial, from the lower degree on, to a sum of its own.
+    #[inline(always)]
+    fn add_each(mut self, simd: S, sums: &mut [S::f64s]) {
+        let (sums, last) = sums.as_chunks_mut::<2>();
+        for sums in sums {
+            add_all(simd, &mut sums[0], &self.lower);
+            self.raise_lower(simd);
+            add_all(simd, &mut sums[1], &self.upper);
+            self.raise_upper(simd);
+        }
+        if let [last] = last {
+            add_all(simd, last, &self.lower);
+        }
     }
 
     #[inline(always)]
@@ -176,17 +182,7 @@ impl<S: Lanes> TakenOff<S> {
             self.square = simd.mul_add_f64s(weighted[n], samples[n], self.square);
         }
         // What is left multiplies every polynomial, for their recurrence is linear.
-        let mut pair = NeighbouringDegrees::new(simd, times, &weighted);
-        let (products, last_product) = self.products.0[..degrees].as_chunks_mut::<2>();
-        for products in products {
-            add_all(simd, &mut products[0], &pair.lower);
-            pair.raise_lower(simd);
-            add_all(simd, &mut products[1], &pair.upper);
-            pair.raise_upper(simd);
-        }
-        if let [product] = last_product {
-            add_all(simd, product, &pair.lower);
-        }
+        NeighbouringDegrees::new(simd, times, &weighted).add_each(simd, &mut self.products.0[..degrees]);
     }
 }
 
