@@ -17,7 +17,7 @@ from tvident._arguments.numbers import (
     whole_number,
 )
 from tvident._arguments.paths import path_of
-from tvident._arguments.progress import Progress, reporter
+from tvident._arguments.progress import Progress, WatchedProgress, reporter
 from tvident._arguments.ranges import finite, percentiles, told_once
 from tvident._arguments.sampling import (
     check_power,
@@ -52,6 +52,7 @@ __all__ = [
     "Progress",
     "RowPolicy",
     "Unwrapped",
+    "WatchedProgress",
     "along_axis",
     "any_array",
     "as_record",

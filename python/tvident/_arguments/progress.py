@@ -12,6 +12,22 @@ Progress: TypeAlias = bool | Callable[[int, int], object] | None
 """``True`` shows a bar; a callable is given the work done and all of it."""
 
 
+class WatchedProgress:
+    """What is told of the work done, and the error that it raised, which is none of the work."""
+
+    def __init__(self, report: Callable[[int, int], object]) -> None:
+        self._report = report
+        self.error: BaseException | None = None
+
+    def __call__(self, done: int, total: int) -> object:
+        """Tell, and keep what is raised."""
+        try:
+            return self._report(done, total)
+        except BaseException as error:
+            self.error = error
+            raise
+
+
 @contextmanager
 def reporter(progress: Progress, description: str) -> Iterator[Callable[[int, int], object] | None]:
     """Give what the core calls with the work done and all of it: a bar, the user's own callable, or nothing."""

@@ -65,11 +65,7 @@ def check_power(name: str, derivative: int, period: float) -> None:
 
 def seconds(name: str, value: str) -> float:
     """Return the seconds of a duration such as ``"0.2 s"``."""
-    match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*([a-zµ]+)\s*", value)
-    try:
-        duration = float(match[1]) * _SECONDS[match[2]] if match else math.nan
-    except (KeyError, ValueError):
-        duration = math.nan
+    duration = _time_in(value)
     if not (math.isfinite(duration) and duration > 0):
         units = ", ".join(_SECONDS)
         raise ValueError(f"{name} must be samples or a duration such as '0.2 s'; got {shown(value)}; units are {units}")
@@ -80,13 +76,21 @@ def delay(name: str, value: object) -> float:
     """Return a time that may be negative, in seconds: from a number of them, or from a text with a unit such as ``"-2 ms"``."""
     if not isinstance(value, str):
         return finite_number(name, value)
-    match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*([a-zµ]+)\s*", value)
-    try:
-        return finite_number(name, float(match[1]) * _SECONDS[match[2]] if match else math.nan)
-    except (KeyError, ValueError):
+    late = _time_in(value)
+    if not math.isfinite(late):
         raise ValueError(
             f"{name} must be seconds, or a time such as '2 ms'; got {shown(value)}; units are {', '.join(_SECONDS)}"
-        ) from None
+        )
+    return late
+
+
+def _time_in(text: str) -> float:
+    """Return the seconds of a number with a unit of time; NaN where a text is none."""
+    match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*([a-zµ]+)\s*", text)
+    try:
+        return float(match[1]) * _SECONDS[match[2]] if match else math.nan
+    except (KeyError, ValueError):
+        return math.nan
 
 
 def window_length(name: str, value: int | str, period: float, *, odd: bool) -> int:

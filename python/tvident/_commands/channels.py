@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import recordings
-from tvident._files import BEGINNINGS, full_name, increasing_times, listed, printable, stated_rate, time_channels
+from tvident._files import ending_by, full_name, increasing_times, listed, printable, stated_rate, time_channels
 from tvident._units import Channel, UnitError, factor_between, named_unit
 
 _RATES = {"fs", "fsamp", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency"}
@@ -108,7 +108,7 @@ def _standard_input() -> recordings.Channels:
             shutil.copyfileobj(sys.stdin.buffer, file)
         with content.open("rb") as file:
             start = file.read(_MOST_START)
-        ending = next((ending for magic, ending in BEGINNINGS.items() if start.startswith(magic)), ".csv")
+        ending = ending_by(start) or ".csv"
         if ending == ".npz" and (b"xl/" in start or b"[Content_Types]" in start):
             ending = ".xlsx"
         named = content.rename(content.with_name(f"standard-input{ending}"))

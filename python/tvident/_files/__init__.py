@@ -1,6 +1,6 @@
 """Reads recordings from files and writes tables to them."""
 
-from tvident._files.beginnings import BEGINNINGS
+from tvident._files.beginnings import ending_by
 from tvident._files.beside import check_beside, place_beside, settings_beside, write_settings
 from tvident._files.channels import Channels, FileError, FileWarning, channel, full_name
 from tvident._files.names import listed, printable
@@ -17,7 +17,6 @@ from tvident._files.text import copy_text
 from tvident._files.unpacked import ending_of
 
 __all__ = [
-    "BEGINNINGS",
     "RESULT_ENDINGS",
     "TABLE_ENDINGS",
     "Channels",
@@ -31,6 +30,7 @@ __all__ = [
     "check_folder",
     "check_place",
     "copy_text",
+    "ending_by",
     "ending_of",
     "full_name",
     "increasing_times",

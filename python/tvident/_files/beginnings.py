@@ -5,7 +5,7 @@ from __future__ import annotations
 import string
 from pathlib import Path
 
-BEGINNINGS = {
+_BEGINNINGS = {
     b"PK\x03\x04": ".npz",
     b"\x93NUMPY": ".npy",
     b"PAR1": ".parquet",
@@ -37,6 +37,11 @@ _START = 512
 _PRINTABLE = frozenset(string.printable.encode())
 
 
+def ending_by(start: bytes) -> str:
+    """Return the ending of files that begin so; nothing where none is known to."""
+    return next((ending for magic, ending in _BEGINNINGS.items() if start.startswith(magic)), "")
+
+
 def cure_of_name(path: Path, ending: str, said: str) -> str:
     """Return what to do about a file that begins as those with another ending; nothing where it begins as its name says, or it was said."""
     try:
@@ -44,7 +49,7 @@ def cure_of_name(path: Path, ending: str, said: str) -> str:
             start = file.read(_START)
     except OSError:
         return ""
-    known = next((kind for magic, kind in BEGINNINGS.items() if start.startswith(magic)), "")
+    known = ending_by(start)
     if not known and start and _PRINTABLE.issuperset(start):
         known = ".csv"
     endings = (known, *_OTHER_ENDINGS.get(known, ()))

@@ -66,7 +66,7 @@ def identify_records(
     rounds = 2 + len(share) if share else 1
     total, before = rounds * sum(sizes), 0
     with arguments.reporter(progress, "identification") as told:
-        report = None if told is None else _ProgressOfRecords(told)
+        report = None if told is None else arguments.WatchedProgress(told)
 
         def every(change: Callable[[int], Mapping[str, Any]]) -> list[Identification]:
             nonlocal before
@@ -106,22 +106,6 @@ def identify_records(
         with_shared(one, shared, {name: moved[name][place] for name in share}) for place, one in enumerate(known)
     ]
     return IdentifiedRecords(together, shared)
-
-
-class _ProgressOfRecords:
-    """What is told of the work done, and the error that it raised, which is none of a record."""
-
-    def __init__(self, report: Callable[[int, int], object]) -> None:
-        self._report = report
-        self.error: BaseException | None = None
-
-    def __call__(self, done: int, total: int) -> object:
-        """Tell, and keep what is raised."""
-        try:
-            return self._report(done, total)
-        except BaseException as error:
-            self.error = error
-            raise
 
 
 def _records(name: str, values: Any) -> int | None:

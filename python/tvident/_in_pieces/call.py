@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -179,7 +179,7 @@ def identify_file(
         "asked": [repr(method), repr(given), nan_policy, every, repr(dict(settings or {}))],
     }
     with ExitStack() as stack, arguments.reporter(progress, "identification") as told_of:
-        report = None if told_of is None else _Watched(told_of)
+        report = None if told_of is None else arguments.WatchedProgress(told_of)
         source, kept = _opened(source_path, place, told, mark if is_text else None)
         stack.callback(kept.close)
         stack.callback(source.close)
@@ -212,22 +212,6 @@ def _check_named(names: Mapping[str, object], others: Mapping[str, object], sett
         raise TypeError(
             f"settings must be those of an earlier result; got {arguments.shown(settings)}; pass result.settings"
         )
-
-
-class _Watched:
-    """What is told of the work done, and the error that it raised: the recording and the call may be right."""
-
-    def __init__(self, report: Callable[[int, int], object]) -> None:
-        self._report = report
-        self.error: BaseException | None = None
-
-    def __call__(self, done: int, total: int) -> object:
-        """Tell, and keep what is raised."""
-        try:
-            return self._report(done, total)
-        except BaseException as error:
-            self.error = error
-            raise
 
 
 _WRONG = (FileError, ValueError, TypeError, KeyError)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
+from tvident._results import part_trusted, samples_and_seconds
 
 _MOST = 8
 """Elements of a line."""
@@ -15,7 +15,9 @@ def in_one_line(result: Any, whose: str) -> str:
     values = [f"{name} {result.value(name)}" for name in list(result.elements)[:_MOST]]
     if len(result.elements) > _MOST:
         values.append(f"and {len(result.elements) - _MOST} more elements")
-    return f"<MergedIdentification of {_what(result, whose)}: {'; '.join(values)}; {_good(result)}>"
+    return (
+        f"<MergedIdentification of {whose}, {samples_and_seconds(result)}: {'; '.join(values)}; {part_trusted(result)}>"
+    )
 
 
 def as_html(result: Any, whose: str) -> str:
@@ -27,18 +29,10 @@ def as_html(result: Any, whose: str) -> str:
         f"<tr><td>{escape(name)}</td><td>{escape(one.kind)}</td><td>{escape(str(one))}</td></tr>"
         for name, one in each.items()
     ]
+    what = f"{whose}, {samples_and_seconds(result)}"
     lines = "".join(f"<li>{escape(line)}</li>" for line in result.advice)
     return (
-        f"<p><b>MergedIdentification of {escape(_what(result, whose))}</b>, {escape(_good(result))}</p>"
+        f"<p><b>MergedIdentification of {escape(what)}</b>, {escape(part_trusted(result))}</p>"
         f"<table><tr><th>element</th><th>kind</th><th>value ± standard error</th></tr>{''.join(rows)}</table>"
         f"{f'<p>what to do</p><ul>{lines}</ul>' if lines else ''}"
     )
-
-
-def _what(result: Any, whose: str) -> str:
-    seconds = float(result.time[-1] - result.time[0]) if result.time.size else 0.0
-    return f"{whose}, {result.time.size} samples, {seconds:.4g} s"
-
-
-def _good(result: Any) -> str:
-    return f"{float(np.mean(result.trusted)):.1%} can be trusted" if result.time.size else "no samples"

@@ -13,6 +13,7 @@ from tvident._results.records import IdentifiedRecords, Shared, covariance_betwe
 from tvident._results.response import Model, accounted_for, every_sample, without_gaps
 from tvident._results.result import Identification
 from tvident._results.scan import Scan, scan_of
+from tvident._results.short import part_trusted, samples_and_seconds
 from tvident._results.simulated import POOR, in_units_of, predicted_ahead, predicted_at_samples
 from tvident._results.stored import plain_scan, plain_words, scan_from, words_from
 from tvident._results.summary import COLUMNS, row_of, sentences_of
@@ -70,6 +71,7 @@ __all__ = [
     "of_batch",
     "of_powers",
     "of_records",
+    "part_trusted",
     "parts_of",
     "plain_scan",
     "plain_words",
@@ -77,6 +79,7 @@ __all__ = [
     "predicted_at_samples",
     "relative_error",
     "row_of",
+    "samples_and_seconds",
     "samples_between",
     "scan_from",
     "scan_of",

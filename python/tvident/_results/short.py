@@ -15,17 +15,22 @@ _RECORDS = 3
 
 def short(result: Any) -> str:
     """Return the numbers of a result in one line."""
-    batch, n = result.inertia.shape[:-1], result.time.size
-    seconds = float(result.time[-1] - result.time[0]) if n else 0.0
-    what = f"{n} samples, {seconds:.4g} s"
+    batch, what = result.inertia.shape[:-1], samples_and_seconds(result)
     if batch:
         kinds = ", ".join(f"{name} {kind}" for name, kind in result.settings["kinds"].items())
-        return f"<Identification of {' x '.join(map(str, batch))} records of {what}: {kinds}; {_good(result)}>"
+        return f"<Identification of {' x '.join(map(str, batch))} records of {what}: {kinds}; {part_trusted(result)}>"
     values = (f"{name} {result.value(name)}" for name in result.settings["kinds"])
-    return f"<Identification of {what}: {'; '.join(values)}; {_good(result)}>"
+    return f"<Identification of {what}: {'; '.join(values)}; {part_trusted(result)}>"
 
 
-def _good(result: Any) -> str:
+def samples_and_seconds(result: Any) -> str:
+    """Return how much was recorded."""
+    seconds = float(result.time[-1] - result.time[0]) if result.time.size else 0.0
+    return f"{result.time.size} samples, {seconds:.4g} s"
+
+
+def part_trusted(result: Any) -> str:
+    """Return how much of it can be trusted."""
     return f"{float(np.mean(result.trusted)):.1%} can be trusted" if result.status.size else "no samples"
 
 
@@ -41,7 +46,7 @@ def as_html(result: Any) -> str:
     batch = result.inertia.shape[:-1]
     records = int(np.prod(batch, dtype=int))
     several = result.inertia.ndim > 1
-    parts = [f"<p><b>{escape(short(result)[1:-1].partition(':')[0])}</b>, {escape(_good(result))}</p>"]
+    parts = [f"<p><b>{escape(short(result)[1:-1].partition(':')[0])}</b>, {escape(part_trusted(result))}</p>"]
     for record in range(min(records, _RECORDS)):
         rows = []
         for name in result.settings["kinds"]:
