@@ -9,7 +9,8 @@ pub(crate) struct OrderSums {
 impl OrderSums {
     pub(crate) fn new(polynomials: &[f64], coefficients: &[f64]) -> Self {
         let (mut value, mut gain) = (0.0, 0.0);
-        let mut sums = Self { values: Vec::new(), gains: Vec::new() };
+        let [values, gains] = [(); 2].map(|()| Vec::with_capacity(coefficients.len()));
+        let mut sums = Self { values, gains };
         for (polynomial, coefficient) in polynomials.iter().zip(coefficients) {
             value += polynomial * coefficient;
             gain += polynomial * polynomial;

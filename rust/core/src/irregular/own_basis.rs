@@ -74,7 +74,8 @@ impl OwnBasis {
     pub(crate) fn at(&self, time: f64, derivatives: usize) -> Vec<Vec<f64>> {
         let mut all: Vec<Vec<f64>> = Vec::with_capacity(derivatives + 1);
         for derivative in 0..=derivatives {
-            let mut values = vec![if derivative == 0 { self.columns[0] } else { 0.0 }];
+            let mut values = Vec::with_capacity(self.steps.len() + 1);
+            values.push(if derivative == 0 { self.columns[0] } else { 0.0 });
             for (degree, taken) in self.steps.iter().enumerate() {
                 let slope = if derivative == 0 { 0.0 } else { derivative as f64 * all[derivative - 1][degree] };
                 let off: f64 = taken[..=degree].iter().zip(&values).map(|(taken, value)| taken * value).sum();

@@ -1,6 +1,5 @@
 //! Samples of windows that share a basis, a group of them in each lane: time, sample, and what its polynomial leaves of the sample.
 
-use std::array::from_fn;
 use std::ops::Range;
 
 use crate::irregular::shared_factor::SharedFactor;
@@ -110,7 +109,8 @@ impl GroupSamples {
                 sample[lane] = value - reference;
             }
         }
-        let [middle, scale, reference] = [&middles, &scales, &self.references].map(|column| simd.load(column, 0));
+        let (middle, scale) = (simd.load(&middles, 0), simd.load(&scales, 0));
+        let reference = simd.load(&self.references, 0);
         for row in (0..turned).step_by(lanes) {
             let mut squares = [[middle; MOST_LANES]; 2];
             for (square, column) in squares.iter_mut().zip([times, record]) {
@@ -135,8 +135,8 @@ impl GroupSamples {
             return [simd.splat_f64s(0.0); 4];
         }
         let at = (range.start + place) * S::F64_LANES;
-        let [times, samples, left] = [&self.times, &self.samples, &self.left].map(|column| simd.load(column, at));
-        [simd.splat_f64s(sign), times, samples, left]
+        let (times, samples) = (simd.load(&self.times, at), simd.load(&self.samples, at));
+        [simd.splat_f64s(sign), times, samples, simd.load(&self.left, at)]
     }
 
     /// The same where other samples move in each lane.
@@ -158,7 +158,11 @@ impl GroupSamples {
                 columns[3][lane] = self.left[at];
             }
         }
-        columns.map(|column| simd.load(&column, 0))
+        let mut row = [simd.splat_f64s(0.0); 4];
+        for (values, column) in row.iter_mut().zip(&columns) {
+            *values = simd.load(column, 0);
+        }
+        row
     }
 
     /// Sums over each lane's first window, from which the polynomial that fits all of the group best was taken off.
@@ -188,8 +192,10 @@ impl GroupSamples {
         let end = self.all.iter().max().map_or(0, |all| all.next_multiple_of(AT_ONCE));
         while at < end {
             let (times, samples) = (rows(simd, &self.times, at), rows(simd, &self.samples, at));
-            let weights: [S::f64s; AT_ONCE] =
-                from_fn(|n| simd.sub_f64s(before(simd, at + n, all), before(simd, at + n, first)));
+            let mut weights = [zero; AT_ONCE];
+            for (n, weight) in weights.iter_mut().enumerate() {
+                *weight = simd.sub_f64s(before(simd, at + n, all), before(simd, at + n, first));
+            }
             sums.add(simd, degrees, &times, &weights, &samples);
             at += AT_ONCE;
         }
@@ -220,13 +226,24 @@ impl GroupSamples {
 /// Some rows of a column.
 #[inline(always)]
 fn rows<S: Lanes>(simd: S, column: &Aligned, at: usize) -> [S::f64s; AT_ONCE] {
-    from_fn(|n| simd.load(column, (at + n) * S::F64_LANES))
+    let mut rows = [simd.splat_f64s(0.0); AT_ONCE];
+    for (n, row) in rows.iter_mut().enumerate() {
+        *row = simd.load(column, (at + n) * S::F64_LANES);
+    }
+    rows
 }
 
 /// One where a row lies before the end, zero where it does not, of some rows; all lie before the least end up to that.
 #[inline(always)]
 fn all_before<S: Lanes>(simd: S, at: usize, (least, end): (usize, S::f64s)) -> [S::f64s; AT_ONCE] {
-    if at + AT_ONCE <= least { [simd.splat_f64s(1.0); AT_ONCE] } else { from_fn(|n| before(simd, at + n, end)) }
+    // No closure: one that is not inlined is compiled without the instructions that were chosen.
+    let mut weights = [simd.splat_f64s(1.0); AT_ONCE];
+    if at + AT_ONCE > least {
+        for (n, weight) in weights.iter_mut().enumerate() {
+            *weight = before(simd, at + n, end);
+        }
+    }
+    weights
 }
 
 /// One where a row lies before the end, zero where it does not.

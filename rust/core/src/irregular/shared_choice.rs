@@ -198,10 +198,13 @@ pub(crate) fn sums<S: Lanes>(
     coefficients: &[S::f64s; MOST],
 ) -> [S::f64s; DERIVATIVES] {
     let mut values = [simd.splat_f64s(0.0); DERIVATIVES];
-    for (k, coefficient) in coefficients.iter().enumerate().take(degrees) {
-        for (value, row) in values.iter_mut().zip(polynomials) {
-            *value = simd.mul_add_f64s(row[k], *coefficient, *value);
+    for (value, row) in values.iter_mut().zip(polynomials) {
+        // In a register: sums of several rows side by side would wait for memory at every coefficient.
+        let mut sum = simd.splat_f64s(0.0);
+        for (polynomial, coefficient) in row.iter().zip(coefficients).take(degrees) {
+            sum = simd.mul_add_f64s(*polynomial, *coefficient, sum);
         }
+        *value = sum;
     }
     values
 }

@@ -3,8 +3,6 @@
 //! `G = L D L'` by columns. Rows below the matrix are what is solved for: of `b` there stays `L⁻¹ b`, whose place `k` belongs to the polynomial of order `k`
 //! that is orthogonal to all lower ones in this window.
 
-use std::array::from_fn;
-
 use pulp::NullaryFnOnce;
 
 use crate::irregular::shared_sums::{DERIVATIVES, MOST};
@@ -65,7 +63,8 @@ impl<S: Lanes> SharedFactor<S> {
         let degrees = degrees.min(MOST);
         for first in (0..degrees).step_by(ABREAST).rev() {
             let end = degrees.min(first + ABREAST);
-            let mut sums: [S::f64s; ABREAST] = from_fn(|n| solution.0[first + n]);
+            let mut sums = [simd.splat_f64s(0.0); ABREAST];
+            sums.copy_from_slice(&solution.0[first..][..ABREAST]);
             // A row of `L D` is a column of `D L'`, and what is on the other side has not been divided by `D` yet.
             for (row, scaled) in self.rows.0[end..degrees].iter().zip(&solution.0[end..degrees]).rev() {
                 let row = &row[first..][..ABREAST];

@@ -189,14 +189,30 @@ impl<S: Lanes> TakenOff<S> {
 /// The polynomials and their derivatives at a time: by derivative, then by degree.
 #[inline(always)]
 pub(crate) fn at<S: Lanes>(simd: S, degrees: usize, time: S::f64s, derivatives: &mut [[S::f64s; MOST]]) {
+    // What goes from degree to degree stays in registers where the compiler knows how many there are.
+    match derivatives {
+        [_] => at_with::<S, 1>(simd, degrees, time, derivatives),
+        [_, _] => at_with::<S, 2>(simd, degrees, time, derivatives),
+        [_, _, _] => at_with::<S, 3>(simd, degrees, time, derivatives),
+        _ => at_with::<S, DERIVATIVES>(simd, degrees, time, derivatives),
+    }
+}
+
+#[inline(always)]
+fn at_with<S: Lanes, const N: usize>(simd: S, degrees: usize, time: S::f64s, derivatives: &mut [[S::f64s; MOST]]) {
     let (zero, one, twice) = (simd.splat_f64s(0.0), simd.splat_f64s(1.0), simd.add_f64s(time, time));
     // T_{k+1} = 2 u T_k - T_{k-1}, differentiated; T_{-1} = T_1 = u.
-    let (mut last, mut before) = ([zero; DERIVATIVES], [zero; DERIVATIVES]);
-    (last[0], before[0], before[1]) = (one, simd.neg_f64s(time), simd.neg_f64s(one));
+    let (mut last, mut before) = ([zero; N], [zero; N]);
+    (last[0], before[0]) = (one, simd.neg_f64s(time));
+    if let Some(before) = before.get_mut(1) {
+        *before = simd.neg_f64s(one);
+    }
     for k in 0..degrees.min(MOST) {
         let mut lower = zero;
-        for (derivative, values) in derivatives.iter_mut().enumerate().take(DERIVATIVES) {
-            values[k] = last[derivative];
+        for derivative in 0..N {
+            if let Some(values) = derivatives.get_mut(derivative) {
+                values[k] = last[derivative];
+            }
             let factor = simd.splat_f64s(2.0 * derivative as f64);
             let raised = simd.mul_add_f64s(twice, last[derivative], before[derivative]);
             (before[derivative], lower, last[derivative]) =

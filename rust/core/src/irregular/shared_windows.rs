@@ -5,6 +5,7 @@
 //! its normal matrix. A window for which that may lose more than [`LOST`] is left to a QR decomposition of its own.
 
 use std::array::from_fn;
+use std::ops::Range;
 
 use crate::irregular::order_table::{OrderTable, TableColumns};
 use crate::irregular::shared_buffers::{GroupSamples, Moves, SlidSums};
@@ -13,10 +14,12 @@ use crate::irregular::shared_factor::SharedFactor;
 use crate::irregular::shared_sums::{DERIVATIVES, MOST, at};
 use crate::irregular::window_estimates::{WindowFit, WindowFits};
 use crate::irregular::window_places::{Numbered, PlacedWindow, WindowGroup, WindowSpan};
+use crate::lanes::tile::{Tile, WindowFields};
 use crate::local_polynomials::options::Order;
 use crate::local_polynomials::sliding_projection::ROUNDING;
 use crate::simd::aligned::OnLines;
 use crate::simd::vectors::{Kernel, Lanes, MOST_LANES};
+use crate::status::Status;
 
 /// What rounding may change of a residual sum of squares, at most, as a part of it.
 pub(crate) const LOST: f64 = 1e-8;
@@ -52,6 +55,7 @@ impl Kernel for WindowsAbreast<'_, '_> {
         let nothing = OnLines([simd.splat_f64s(0.0); MOST]);
         let mut work = Workspace {
             columns: TableColumns::new(S::F64_LANES),
+            tile: Tile::new(self.fields().good + 1, S::F64_LANES, S::F64_LANES),
             factor: SharedFactor::zero(simd),
             polynomials: OnLines([nothing.0; DERIVATIVES]),
             off: nothing.clone(),
@@ -69,6 +73,8 @@ impl Kernel for WindowsAbreast<'_, '_> {
 /// What batch after batch uses.
 struct Workspace<S: Lanes> {
     columns: TableColumns,
+    /// What was found in the last few windows of each lane.
+    tile: Tile,
     factor: SharedFactor<S>,
     /// Shared polynomials and their derivatives at the samples that windows are for.
     polynomials: OnLines<[S::f64s; MOST], DERIVATIVES>,
@@ -81,9 +87,7 @@ struct Workspace<S: Lanes> {
 
 /// Windows side by side: what the kernel knows of each lane's.
 struct Abreast {
-    /// The number of each lane's window, where it has one.
-    windows: [Option<usize>; MOST_LANES],
-    /// Time of the sample that it is for, in the group's time.
+    /// Time of the sample that it is for.
     time: [f64; MOST_LANES],
     /// What its own reference is above that of the group, and the reference of the group.
     above: [f64; MOST_LANES],
@@ -93,15 +97,25 @@ struct Abreast {
     scale: [f64; MOST_LANES],
 }
 
-/// What was found in windows side by side.
-struct FoundAbreast {
-    values: [[f64; MOST_LANES]; DERIVATIVES],
-    errors: [[f64; MOST_LANES]; DERIVATIVES],
-    order: [f64; MOST_LANES],
-    sigma: [f64; MOST_LANES],
-    /// Bits of lanes.
-    exact: u32,
-    good: u32,
+/// What was found in windows side by side, in the group's time.
+struct FoundAbreast<S: Lanes> {
+    values: [S::f64s; DERIVATIVES],
+    errors: [S::f64s; DERIVATIVES],
+    order: S::f64s,
+    sigma: S::f64s,
+    exact: S::m64s,
+    good: S::m64s,
+}
+
+/// Where the fields of a window are in the tile: derivatives come first.
+#[derive(Clone, Copy)]
+struct FieldsAbreast {
+    errors: usize,
+    sigma: usize,
+    /// The order, and 256 times the flags.
+    code: usize,
+    /// One where the window is good, zero where it is not.
+    good: usize,
 }
 
 impl Abreast {
@@ -112,7 +126,7 @@ impl Abreast {
         for ((middle, scale), group) in middle.iter_mut().zip(&mut scale).zip(groups) {
             (*middle, *scale) = group.scale();
         }
-        Self { windows: [None; MOST_LANES], time: nothing, above: nothing, reference, middle, scale }
+        Self { time: nothing, above: nothing, reference, middle, scale }
     }
 }
 
@@ -131,7 +145,11 @@ impl WindowsAbreast<'_, '_> {
             }
             self.step_to(&mut abreast, groups, step, &mut work.columns);
             let found = self.solve(simd, degrees, &abreast, &sums, work);
-            self.write(degrees, &abreast, &found);
+            self.put(simd, degrees, &abreast, &found, &mut work.tile.fields_of::<S>(step));
+            let next = step + 1;
+            if next % S::F64_LANES == 0 || next == longest {
+                self.write(simd, groups, step / S::F64_LANES * S::F64_LANES..next, &work.tile);
+            }
         }
     }
 
@@ -153,18 +171,16 @@ impl WindowsAbreast<'_, '_> {
         Moves::Apart(moves)
     }
 
-    /// Steps to a window of each group.
+    /// Steps to a window of each group. Lanes that have no window any more stay: what is found there goes nowhere.
+    #[inline(always)]
     fn step_to(&self, abreast: &mut Abreast, groups: &[WindowGroup], step: usize, columns: &mut TableColumns) {
-        for (lane, group) in groups.iter().enumerate() {
+        for (lane, group) in groups.iter().enumerate().take(MOST_LANES) {
             let number = group.windows.start + step;
             if number >= group.windows.end {
-                abreast.windows[lane] = None;
                 continue;
             }
             let samples = &self.placed[number].samples;
-            abreast.windows[lane] = Some(number);
-            let time = self.fit.times[self.numbered.sample(number)];
-            abreast.time[lane] = (time - abreast.middle[lane]) * abreast.scale[lane];
+            abreast.time[lane] = self.fit.times[self.numbered.sample(number)];
             abreast.above[lane] = self.record[samples.start + samples.len() / 2] - abreast.reference[lane];
             if columns.lengths[lane] != samples.len() {
                 columns.set(lane, (self.tables)(samples.len()));
@@ -181,12 +197,14 @@ impl WindowsAbreast<'_, '_> {
         abreast: &Abreast,
         window: &SlidSums<S>,
         work: &mut Workspace<S>,
-    ) -> FoundAbreast {
-        let Workspace { columns, factor, polynomials, off, coefficients, left } = work;
+    ) -> FoundAbreast<S> {
+        let Workspace { columns, factor, polynomials, off, coefficients, left, .. } = work;
         let errors = !self.fits.errors.is_empty();
         let wanted = self.fit.derivatives + 1;
         let zero = simd.splat_f64s(0.0);
-        at(simd, degrees, simd.load(&abreast.time, 0), &mut polynomials.0[..wanted]);
+        let time = simd.sub_f64s(simd.load(&abreast.time, 0), simd.load(&abreast.middle, 0));
+        let time = simd.mul_f64s(time, simd.load(&abreast.scale, 0));
+        at(simd, degrees, time, &mut polynomials.0[..wanted]);
         let before = sums(simd, degrees, &polynomials.0[..wanted], &window.coefficients.0);
         factor.below.0[0] = window.left.products.0;
         if errors {
@@ -236,53 +254,99 @@ impl WindowsAbreast<'_, '_> {
         simd.max_f64s(simd.mul_f64s(length, quantised), simd.mul_f64s(energy, simd.splat_f64s(ROUNDING)))
     }
 
-    /// Writes what is good.
-    fn write(&mut self, degrees: usize, abreast: &Abreast, found: &FoundAbreast) {
-        for (lane, window) in abreast.windows.iter().enumerate() {
-            let Some(window) = *window else { continue };
-            if found.good >> lane & 1 == 0 {
-                continue;
+    /// Where the fields of a window are in the tile.
+    fn fields(&self) -> FieldsAbreast {
+        let errors = self.fits.derivatives.len();
+        let sigma = errors + self.fits.errors.len();
+        FieldsAbreast { errors, sigma, code: sigma + 1, good: sigma + 2 }
+    }
+
+    /// Puts what was found into the tile.
+    #[inline(always)]
+    fn put<S: Lanes>(
+        &self,
+        simd: S,
+        degrees: usize,
+        abreast: &Abreast,
+        found: &FoundAbreast<S>,
+        tile: &mut WindowFields<'_>,
+    ) {
+        let fields = self.fields();
+        let (zero, one, of_group) = (simd.splat_f64s(0.0), simd.splat_f64s(1.0), simd.load(&abreast.scale, 0));
+        let (mut level, mut scale) = (simd.load(&abreast.reference, 0), one);
+        for (derivative, &value) in found.values.iter().enumerate().take(fields.errors) {
+            tile.put(simd, derivative, simd.add_f64s(level, simd.mul_f64s(value, scale)));
+            if fields.errors + derivative < fields.sigma {
+                let error = simd.mul_f64s(found.errors[derivative], scale);
+                tile.put(simd, fields.errors + derivative, error);
             }
-            self.done[window] = true;
-            let mut scale = 1.0;
-            for (derivative, row) in self.fits.derivatives.iter_mut().enumerate() {
-                let level = if derivative == 0 { abreast.reference[lane] } else { 0.0 };
-                row[window] = level + found.values[derivative][lane] * scale;
-                if let Some(errors) = self.fits.errors.get_mut(derivative) {
-                    errors[window] = found.errors[derivative][lane] * scale;
+            (level, scale) = (zero, simd.mul_f64s(scale, of_group));
+        }
+        tile.put(simd, fields.sigma, found.sigma);
+        // The flags of the lowest order, of the highest, and of one that is exact.
+        let [lowest, highest] = [0, degrees - 1].map(|order| self.fit.status(order, degrees, false, false));
+        let is_highest = simd.greater_than_or_equal_f64s(found.order, simd.splat_f64s((degrees - 1) as f64));
+        let mut code = found.order;
+        for (is_so, flags) in
+            [(simd.less_than_f64s(found.order, one), lowest), (is_highest, highest), (found.exact, Status::EXACT)]
+        {
+            let flags = simd.splat_f64s(256.0 * f64::from(flags.bits()));
+            code = simd.add_f64s(code, simd.select_f64s(is_so, flags, zero));
+        }
+        tile.put(simd, fields.code, code);
+        tile.put(simd, fields.good, simd.select_f64s(found.good, one, zero));
+    }
+
+    /// Writes the windows of some steps, which the tile holds. Those that are not good are written again.
+    #[inline(always)]
+    fn write<S: Lanes>(&mut self, simd: S, groups: &[WindowGroup], steps: Range<usize>, tile: &Tile) {
+        let fields = self.fields();
+        let windows_of = |group: &WindowGroup| {
+            group.windows.end.min(group.windows.start + steps.start)
+                ..group.windows.end.min(group.windows.start + steps.end)
+        };
+        let rows = self.fits.derivatives.iter_mut().chain(&mut self.fits.errors).map(|row| &mut **row);
+        for (field, row) in rows.chain([&mut *self.fits.sigma]).enumerate() {
+            let square = tile.square(simd, field, steps.start);
+            for (group, &values) in groups.iter().zip(&square) {
+                let into = &mut row[windows_of(group)];
+                if into.len() == S::F64_LANES {
+                    simd.store(into, 0, values);
+                } else {
+                    let mut lanes = [0.0; MOST_LANES];
+                    simd.store(&mut lanes, 0, values);
+                    into.copy_from_slice(&lanes[..into.len()]);
                 }
-                scale *= abreast.scale[lane];
             }
-            #[allow(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "an order is a small whole number"
-            )]
-            let order = found.order[lane] as u8;
-            self.fits.order[window] = order;
-            let exact = found.exact >> lane & 1 == 1;
-            self.fits.status[window] = self.fit.status(usize::from(order), degrees, false, exact).bits();
-            self.fits.sigma[window] = found.sigma[lane];
+        }
+        let (codes, good) = (tile.square(simd, fields.code, steps.start), tile.square(simd, fields.good, steps.start));
+        let half = simd.splat_f64s(0.5);
+        for (group, (&codes, &good)) in groups.iter().zip(codes.iter().zip(&good)) {
+            let windows = windows_of(group);
+            let (mut orders, mut flags) = ([0; MOST_LANES], [0; MOST_LANES]);
+            simd.split(codes, &mut orders, &mut flags);
+            self.fits.order[windows.clone()].copy_from_slice(&orders[..windows.len()]);
+            self.fits.status[windows.clone()].copy_from_slice(&flags[..windows.len()]);
+            let good = simd.bits(simd.greater_than_f64s(good, half));
+            for (place, done) in self.done[windows].iter_mut().enumerate() {
+                *done = good >> place & 1 == 1;
+            }
         }
     }
 }
 
-impl FoundAbreast {
+impl<S: Lanes> FoundAbreast<S> {
     /// What is chosen, before anything is estimated.
     #[inline(always)]
-    fn of<S: Lanes>(simd: S, choice: &SharedChoice<S>, good: S::m64s) -> Self {
-        let nothing = [0.0; MOST_LANES];
-        let (values, errors) = ([nothing; DERIVATIVES], [nothing; DERIVATIVES]);
-        let (exact, good) = (simd.bits(choice.exact), simd.bits(good));
-        let mut found = Self { values, errors, order: nothing, sigma: nothing, exact, good };
-        simd.store(&mut found.order, 0, choice.order);
-        simd.store(&mut found.sigma, 0, simd.sqrt_f64s(choice.variance));
-        found
+    fn of(simd: S, choice: &SharedChoice<S>, good: S::m64s) -> Self {
+        let nothing = [simd.splat_f64s(0.0); DERIVATIVES];
+        let sigma = simd.sqrt_f64s(choice.variance);
+        Self { values: nothing, errors: nothing, order: choice.order, sigma, exact: choice.exact, good }
     }
 
     /// Estimates every derivative with its standard error.
     #[inline(always)]
-    fn estimate_with_errors<S: Lanes>(
+    fn estimate_with_errors(
         &mut self,
         simd: S,
         (residuals, choice, shares, columns): (
@@ -304,15 +368,14 @@ impl FoundAbreast {
                 full = simd.mul_add_f64s(simd.mul_f64s(*polynomial, *inverse), *own, full);
             }
             let parts = [row, coefficients, &factor.inverse.0];
-            let (value, error) = residuals.estimate(simd, columns, (choice, shares), parts, full);
-            simd.store(&mut self.values[derivative], 0, value);
-            simd.store(&mut self.errors[derivative], 0, error);
+            (self.values[derivative], self.errors[derivative]) =
+                residuals.estimate(simd, columns, (choice, shares), parts, full);
         }
     }
 
     /// Estimates every derivative by one polynomial in the shared basis: what is left of the samples, and orders that were taken off too many.
     #[inline(always)]
-    fn estimate<S: Lanes>(
+    fn estimate(
         &mut self,
         simd: S,
         degrees: usize,
@@ -322,7 +385,7 @@ impl FoundAbreast {
     ) {
         let more = sums(simd, degrees, &polynomials[..before.len()], left);
         for ((value, &before), more) in self.values.iter_mut().zip(before).zip(more) {
-            simd.store(value, 0, simd.add_f64s(before, more));
+            *value = simd.add_f64s(before, more);
         }
     }
 }

@@ -17,7 +17,7 @@ use crate::irregular::own_basis::{OwnBasis, dot};
 use crate::irregular::shared_buffers::GroupSamples;
 use crate::irregular::shared_windows::{WindowsAbreast, can_share};
 use crate::irregular::window_estimates::{WindowFit, WindowFits};
-use crate::irregular::window_places::{Numbered, PlacedWindow, WindowSpan, groups};
+use crate::irregular::window_places::{Numbered, OwnWindow, PlacedWindow, WindowSpan, groups};
 use crate::local_polynomials::options::Order;
 use crate::local_polynomials::sliding_projection::ROUNDING;
 use crate::record::samples::is_usable;
@@ -162,15 +162,17 @@ impl WindowFit {
         basis: &mut OwnBasis,
         fits: &mut WindowFits<'_>,
     ) {
-        let mut last: Option<(&PlacedWindow, Option<FittedWindow>)> = None;
+        let mut last: Option<(OwnWindow<'_>, Option<FittedWindow>)> = None;
         for (place, window) in placed.iter().enumerate().filter(|(place, _)| !done[*place]) {
+            let sample = numbered.sample(place);
+            let own = self.span.own(&self.times, sample, window);
             // Near the ends many samples have the same window.
             let fitted = match &last {
-                Some((before, fitted)) if *before == window => fitted,
-                _ => &last.insert((window, self.fitted(record, window, basis))).1,
+                Some((before, fitted)) if *before == own => fitted,
+                _ => &last.insert((own, self.fitted(record, own, basis))).1,
             };
             match fitted {
-                Some(fitted) => self.one(window, fitted, numbered.sample(place), basis, fits, place),
+                Some(fitted) => self.one(own, fitted, sample, basis, fits, place),
                 None => fits.invalidate(place),
             }
         }
@@ -181,24 +183,25 @@ impl WindowFit {
     pub fn scores(&self, record: &[f64], sample: usize) -> Vec<f64> {
         let mut basis = OwnBasis::default();
         let window = self.span.around(&self.times, sample);
+        let own = self.span.own(&self.times, sample, &window);
         let Order::Chosen { criterion, highest } = self.order else { return vec![f64::NAN] };
         let score = |fitted: FittedWindow| {
             let length = window.samples.len();
             let of = |(order, residual): (usize, &f64)| criterion.score(residual.max(fitted.floor), order, length);
             fitted.residuals.iter().enumerate().map(of).collect()
         };
-        self.fitted(record, &window, &mut basis).map_or_else(|| vec![f64::NAN; highest + 1], score)
+        self.fitted(record, own, &mut basis).map_or_else(|| vec![f64::NAN; highest + 1], score)
     }
 
     /// Fits all candidates to a window, or `None` where it holds an unusable sample or too few.
-    fn fitted(&self, record: &[f64], window: &PlacedWindow, basis: &mut OwnBasis) -> Option<FittedWindow> {
-        let (samples, length) = (&record[window.samples.clone()], window.samples.len());
+    fn fitted(&self, record: &[f64], window: OwnWindow<'_>, basis: &mut OwnBasis) -> Option<FittedWindow> {
+        let range = window.placed.samples.clone();
+        let (samples, length) = (&record[range.clone()], range.len());
         let candidates = OrderTable::new(self.order, length).degrees;
         if length < FEWEST || candidates == 0 || !samples.iter().all(|&value| is_usable(value)) {
             return None;
         }
-        let times: Vec<f64> =
-            self.times[window.samples.clone()].iter().map(|time| (time - window.middle) / window.half).collect();
+        let times: Vec<f64> = self.times[range].iter().map(|time| (time - window.middle) / window.half).collect();
         basis.make(&times, candidates);
         let reference = samples[length / 2];
         let mut left: Vec<f64> = samples.iter().map(|value| value - reference).collect();
@@ -215,14 +218,14 @@ impl WindowFit {
     /// Writes the estimates of a window that was fitted alone, whose basis is the last that was made.
     fn one(
         &self,
-        window: &PlacedWindow,
+        window: OwnWindow<'_>,
         fitted: &FittedWindow,
         sample: usize,
         basis: &OwnBasis,
         fits: &mut WindowFits<'_>,
         place: usize,
     ) {
-        let (length, degrees) = (window.samples.len(), fitted.coefficients.len());
+        let (edge, length, degrees) = (window.placed.edge, window.placed.samples.len(), fitted.coefficients.len());
         let variance = |order: usize| {
             let free = length - order - 1;
             if free == 0 { f64::NAN } else { fitted.residuals[order].max(fitted.floor) / free as f64 }
@@ -246,20 +249,20 @@ impl WindowFit {
             let level = if derivative == 0 { fitted.reference } else { 0.0 };
             let sums = OrderSums::new(polynomials, &fitted.coefficients);
             let taken = match shares {
-                Some(_) if window.edge => sums.best(order, derivative, variance(order)),
+                Some(_) if edge => sums.best(order, derivative, variance(order)),
                 _ => order,
             };
             fits.derivatives[derivative][place] = level + sums.values[taken] * scale;
             let Some(errors) = fits.errors.get_mut(derivative) else { continue };
             let error = match &shares {
-                Some(shares) if !window.edge => sums.error(taken, shares, variance),
+                Some(shares) if !edge => sums.error(taken, shares, variance),
                 _ => (variance(order) * sums.gains[taken]).sqrt(),
             };
             errors[place] = error * scale;
         }
         let exact = fitted.residuals[order] <= fitted.floor;
         fits.order[place] = u8::try_from(order).unwrap_or(u8::MAX);
-        fits.status[place] = self.status(order, degrees, window.edge, exact).bits();
+        fits.status[place] = self.status(order, degrees, edge, exact).bits();
         fits.sigma[place] = variance(order).sqrt();
     }
 }

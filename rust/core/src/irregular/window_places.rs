@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::record::samples::is_usable;
+use crate::record::samples::{all_usable, is_usable};
 
 /// A polynomial that is at most one in a window is at most `cosh(p acosh(1 + d))` at a distance of `d` half lengths from it (Chebyshev). Windows share a
 /// basis while that is less than `cosh(GROWTH)`, 202, at the far ends of all of them together: what rounding changes is amplified by its square.
@@ -24,10 +24,15 @@ pub enum WindowSpan {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PlacedWindow {
     pub(crate) samples: Range<usize>,
-    /// Its middle and its half length in seconds.
+    pub(crate) edge: bool,
+}
+
+/// A window that is fitted alone: its middle and its half length in seconds.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) struct OwnWindow<'a> {
+    pub(crate) placed: &'a PlacedWindow,
     pub(crate) middle: f64,
     pub(crate) half: f64,
-    pub(crate) edge: bool,
 }
 
 /// Which samples windows are around that follow each other.
@@ -63,27 +68,43 @@ impl WindowSpan {
     /// The window around a sample, within the record, where samples before `begin` and all up to `end` are known to lie before its begin and end.
     pub(crate) fn place(self, times: &[f64], sample: usize, begin: usize, end: usize) -> PlacedWindow {
         let count = times.len();
-        let (first, last) = (times[0], times[count - 1]);
         match self {
             Self::Samples(length) => {
                 let half = length / 2;
                 let begin = sample.saturating_sub(half).min(count - length.min(count));
                 let samples = begin..count.min(begin + length);
-                let (from, to) = (times[samples.start], times[samples.end - 1]);
-                let edge = sample < half || sample + half >= count;
-                PlacedWindow { samples, middle: f64::midpoint(from, to), half: (to - from) / 2.0, edge }
+                PlacedWindow { samples, edge: sample < half || sample + half >= count }
             }
             Self::Seconds(length) => {
                 let half = length / 2.0;
-                let middle = times[sample].min(last - half).max(first + half);
+                let middle = Self::middle(times, sample, half);
                 let before = |from: usize, is_before: &dyn Fn(f64) -> bool| {
                     from + times[from..].iter().take_while(|&&time| is_before(time)).count()
                 };
                 let begin = before(begin, &|time| time < middle - half);
                 let end = before(end.max(begin), &|time| time <= middle + half);
-                PlacedWindow { samples: begin..end, middle, half, edge: (middle - times[sample]).abs() > 0.0 }
+                PlacedWindow { samples: begin..end, edge: (middle - times[sample]).abs() > 0.0 }
             }
         }
+    }
+
+    /// A window around a sample with the time that a basis of its own has.
+    pub(crate) fn own<'a>(self, times: &[f64], sample: usize, placed: &'a PlacedWindow) -> OwnWindow<'a> {
+        match self {
+            Self::Samples(_) => {
+                let (from, to) = (times[placed.samples.start], times[placed.samples.end - 1]);
+                OwnWindow { placed, middle: f64::midpoint(from, to), half: (to - from) / 2.0 }
+            }
+            Self::Seconds(length) => {
+                let half = length / 2.0;
+                OwnWindow { placed, middle: Self::middle(times, sample, half), half }
+            }
+        }
+    }
+
+    /// The middle of a window of seconds, which lies within the record.
+    fn middle(times: &[f64], sample: usize, half: f64) -> f64 {
+        times[sample].min(times[times.len() - 1] - half).max(times[0] + half)
     }
 
     /// The window around a sample, whatever lies before.
@@ -123,16 +144,24 @@ pub(crate) fn groups(
     degrees: impl Fn(usize) -> Option<usize>,
 ) -> Vec<WindowGroup> {
     let mut groups: Vec<WindowGroup> = Vec::new();
+    let (Some(begin), Some(last)) = (windows.first(), windows.last()) else { return groups };
+    let all = all_usable(&record[begin.samples.start..last.samples.end.max(begin.samples.start)]);
     // Samples are usable from this one to the one before `seen`.
     let (mut usable, mut seen) = (0, 0);
-    let mut most = (usize::MAX, 0.0);
+    let (mut most, mut usual) = ((usize::MAX, 0.0), (usize::MAX, None));
     for (number, window) in windows.iter().enumerate() {
-        let new = seen.max(window.samples.start);
-        if let Some(last) = record[new..window.samples.end.max(new)].iter().rposition(|&value| !is_usable(value)) {
-            usable = new + last + 1;
+        if !all {
+            let new = seen.max(window.samples.start);
+            if let Some(last) = record[new..window.samples.end.max(new)].iter().rposition(|&value| !is_usable(value)) {
+                usable = new + last + 1;
+            }
+            seen = seen.max(window.samples.end);
         }
-        seen = seen.max(window.samples.end);
-        let Some(degrees) = degrees(window.samples.len()) else { continue };
+        let length = window.samples.len();
+        if usual.0 != length {
+            usual = (length, degrees(length));
+        }
+        let Some(degrees) = usual.1 else { continue };
         if window.edge || usable > window.samples.start {
             continue;
         }
