@@ -144,8 +144,12 @@ impl SomeRuns<'_> {
     fn read(&self, scratch: &mut SpanScratch) {
         let SpanScratch { rows, margin, whole, counts, missing, .. } = scratch;
         let of = self.rows();
-        let [before, after] = self.longest();
-        *margin = before.max(after).next_multiple_of(MOST_LANES);
+        // As many rows of every run are laid side by side, up to whole vectors.
+        let [before, after] = self.longest().map(|longest| longest.next_multiple_of(MOST_LANES));
+        let beyond = |run: &Run| {
+            (of.start + before).saturating_sub(run.boundary).max((run.boundary + after).saturating_sub(of.end))
+        };
+        *margin = self.runs.iter().map(beyond).max().unwrap_or(0);
         let places = *margin..*margin + of.len();
         let sources = self.equations.columns.iter().copied().chain(self.equations.weights);
         rows.resize_with(self.plan.columns() + usize::from(self.equations.weights.is_some()), Vec::new);
@@ -202,6 +206,8 @@ impl<H: Dimensions> Kernel for SpanKernel<'_, '_, '_, H> {
         }
         let together = together(self.shape) * S::F64_LANES;
         let longest = self.group.runs.iter().map(|run| run.windows.len()).max().unwrap_or(0);
+        let [before, after] = self.group.longest();
+        let storages = [FactorStorage::of::<S, H>(self.shape, before), FactorStorage::of::<S, H>(self.shape, after)];
         for first in (0..longest).step_by(together) {
             if first % ASK == 0 && !(self.go_on)() {
                 return;
@@ -210,7 +216,7 @@ impl<H: Dimensions> Kernel for SpanKernel<'_, '_, '_, H> {
                 let windows = self.group.runs[lane].windows.clone();
                 let some = windows.start + first..windows.end.min(windows.start + first + together);
                 if !some.is_empty() {
-                    self.solve(simd, lane, some);
+                    self.solve(simd, lane, some, storages);
                 }
             }
         }
@@ -295,39 +301,40 @@ impl<H: Dimensions> SpanKernel<'_, '_, '_, H> {
         true
     }
 
-    /// Solves some neighbouring windows of the run of a lane.
+    /// Solves some neighbouring windows of the run of a lane, whose factors are stored before its boundary and after it.
     #[inline(always)]
-    fn solve<S: Lanes>(&mut self, simd: S, lane: usize, some: Range<usize>) {
+    fn solve<S: Lanes>(&mut self, simd: S, lane: usize, some: Range<usize>, storages: [FactorStorage; 2]) {
         let (shape, group) = (self.shape, self.group);
         let plan = group.plan;
         let size = shape.size() * S::F64_LANES;
         let (before, after) = group.spans.around_boundary(some.clone());
         let (mut suffix, mut prefix) = (empty(simd, shape), empty(simd, shape));
         let mut row = shape.factor(simd.splat_f64s(0.0));
+        let boundary = group.runs[lane].boundary - group.rows().start;
         let SpanScratch { suffixes, prefixes, windows, tile, counts, whole, .. } = &mut *self.scratch;
         if windows.len() < TOGETHER * size {
             *windows = Aligned::zeros(TOGETHER * size);
         }
         let vectors = some.len().div_ceil(S::F64_LANES);
-        let boundary = group.runs[lane].boundary - group.rows().start;
-        let storages = group.longest().map(|length| FactorStorage::of::<S, H>(shape, length));
-        // Beyond the last window the last is solved again.
-        let mut rows = [before, after].map(|rows| [rows[some.len() - 1]; TOGETHER * MOST_LANES]);
-        rows[0][..some.len()].copy_from_slice(before);
-        rows[1][..some.len()].copy_from_slice(after);
         let mut held = [0.0; TOGETHER * MOST_LANES];
-        let sides = held.iter_mut().zip(rows[0].iter().zip(&rows[1]));
-        if *whole {
-            sides.for_each(|(held, (&before, &after))| *held = f64::from(before + after));
-        } else {
-            sides.for_each(|(held, (&before, &after))| {
-                *held = f64::from(counts[boundary + after as usize] - counts[boundary - before as usize]);
-            });
-        }
-        for vector in 0..vectors {
-            let own = |side: usize| &rows[side][vector * S::F64_LANES..(vector + 1) * S::F64_LANES];
-            storages[0].get(simd, shape, suffixes, (lane, own(0)), &mut suffix);
-            storages[1].get(simd, shape, prefixes, (lane, own(1)), &mut prefix);
+        for (vector, held) in held.chunks_exact_mut(S::F64_LANES).enumerate().take(vectors) {
+            let first = vector * S::F64_LANES;
+            let (mut last_before, mut last_after) = ([0; MOST_LANES], [0; MOST_LANES]);
+            // Read in their place, but for the last windows: what was just copied in parts would have to be waited for.
+            let (before, after) = if first + S::F64_LANES <= some.len() {
+                (&before[first..first + S::F64_LANES], &after[first..first + S::F64_LANES])
+            } else {
+                (filled_up::<S>(&before[first..], &mut last_before), filled_up::<S>(&after[first..], &mut last_after))
+            };
+            for (held, (&before, &after)) in held.iter_mut().zip(before.iter().zip(after)) {
+                *held = if *whole {
+                    f64::from(before + after)
+                } else {
+                    f64::from(counts[boundary + after as usize] - counts[boundary - before as usize])
+                };
+            }
+            storages[0].get(simd, shape, suffixes, (lane, before), &mut suffix);
+            storages[1].get(simd, shape, prefixes, (lane, after), &mut prefix);
             merge(simd, shape, &mut suffix, &prefix, &mut row);
             store(simd, shape, &mut windows[vector * size..][..size], &suffix);
         }
@@ -413,7 +420,15 @@ impl<H: Dimensions> SpanKernel<'_, '_, '_, H> {
     }
 }
 
+/// Rows of the last few windows, and of the last of them in the lanes beyond: it is solved again there.
+#[inline(always)]
+fn filled_up<'a, S: Lanes>(rows: &[u32], into: &'a mut [u32; MOST_LANES]) -> &'a [u32] {
+    into.fill(rows[rows.len() - 1]);
+    into[..rows.len()].copy_from_slice(rows);
+    &into[..S::F64_LANES]
+}
+
 /// Vectors of neighbouring windows that are solved together.
 fn together<H: Dimensions>(shape: H) -> usize {
-    if shape.size() <= 6 { TOGETHER } else { TOGETHER / 2 }
+    if shape.size() <= 10 { TOGETHER } else { TOGETHER / 2 }
 }
