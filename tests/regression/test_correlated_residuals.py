@@ -56,6 +56,22 @@ def test_in_long_windows_errors_are_those_of_newey_and_west() -> None:
     np.testing.assert_allclose(found.stderr[3000], expected.bse, rtol=np.sqrt((lags + 1) / window))
 
 
+def test_lags_are_what_all_neighbours_ask_for() -> None:
+    A, b = problem(7, 3000, 0.0)
+    window = 201
+    # Rows are looked at some at a time: what neighbours on both sides of a border share counts as well.
+    b[[1023, 1024, 2047, 2048]] += 20
+    found = tvident.rolling_least_squares(A, b, window, covariance="hac")
+    around = np.clip(np.arange(3000), window // 2, 2999 - window // 2)
+    products = A * (b - np.einsum("np,np->n", A, found.params[around]))[:, None]
+    squares = 0.5 * (products[1:] ** 2 + products[:-1] ** 2).sum(axis=0)
+    rho = (products[1:] * products[:-1]).sum(axis=0) / squares
+    bend = np.max(np.abs(2 * rho / (1 - rho**2)))
+    assert found.lags == np.ceil(1.1447 * np.cbrt(bend**2 * window)) - 1
+    # Of the others alone none are asked for.
+    assert found.lags
+
+
 def test_errors_are_those_of_the_definition() -> None:
     A, b = problem(6, 400, 0.5)
     window, lags = 101, 4

@@ -28,6 +28,9 @@ use crate::simd::vectors::{Kernel, Lanes, apart, dispatch};
 /// Rows of which the correlation of the residuals is learnt: it is known to a few thousandths then.
 const LEARNT_OF: usize = 1 << 17;
 
+/// Rows of it whose products are made at once, and stay in a near cache.
+const AT_ONCE: usize = 1 << 10;
+
 impl RollingLeastSquares {
     /// The same as [`RollingLeastSquares::run`], with standard errors that know of correlated residuals: over so many rows, or over as
     /// many as the residuals of the record ask for. Returns how many. The outputs must belong to every row.
@@ -216,12 +219,18 @@ impl Correlations<'_, '_, '_> {
     #[inline(always)]
     fn run_with<S: Lanes, const N: usize, const R: usize>(self, simd: S) -> Vec<Neighbours> {
         let Self { fits, rows, products } = self;
-        let range = rows.start.cast_signed()..rows.end.cast_signed();
-        apart(simd, ProductsOfRows::<N, R> { fits, range, end: rows.end, into: &mut *products });
         let mut sums: [Neighbours; N] = std::array::from_fn(|_| Neighbours::default());
-        for rows in products.values.as_chunks::<N>().0[..rows.len()].windows(2) {
-            for (regressor, sums) in sums.iter_mut().enumerate() {
-                sums.add(rows[0][regressor], rows[1][regressor]);
+        // Where rows look for windows that are valid, they look as far as these rows go.
+        let at_once = if fits.are_valid(&rows) { AT_ONCE } else { rows.len().max(1) };
+        for first in rows.clone().step_by(at_once) {
+            // The last of them is the first of the next.
+            let some = first..rows.end.min(first + at_once + 1);
+            let range = some.start.cast_signed()..some.end.cast_signed();
+            apart(simd, ProductsOfRows::<N, R> { fits, range, end: rows.end, into: &mut *products });
+            for rows in products.values.as_chunks::<N>().0[..some.len()].windows(2) {
+                for (regressor, sums) in sums.iter_mut().enumerate() {
+                    sums.add(rows[0][regressor], rows[1][regressor]);
+                }
             }
         }
         sums[..fits.plan.regressors].to_vec()

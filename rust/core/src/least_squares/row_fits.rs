@@ -57,16 +57,27 @@ impl Fits<'_> {
         self.status[row - self.first] & Status::INVALID.bits() == 0
     }
 
+    /// Whether every window that lies best around one of some rows is held and valid.
+    pub(crate) fn are_valid(&self, rows: &Range<usize>) -> bool {
+        let (held, fits) = (self.held(), self.centre(rows.start)..self.centre(rows.end.max(1) - 1) + 1);
+        let is_held = held.start <= fits.start && fits.end <= held.end;
+        is_held && self.any_flags(&fits) & Status::INVALID.bits() == 0
+    }
+
+    /// The flags of some windows, which are held.
+    fn any_flags(&self, windows: &Range<usize>) -> u16 {
+        // No early return, so that the loop becomes vector instructions.
+        let places = windows.start - self.first..windows.end - self.first;
+        self.status[places].iter().fold(0, |any, flags| any | flags)
+    }
+
     /// The results around some rows where these are one after the other.
     fn own_fits(&self, rows: &Range<usize>) -> Option<Range<usize>> {
         let fits = self.centre(rows.start)..self.centre(rows.end - 1) + 1;
         let held = self.held();
         let is_held = held.start <= fits.start && fits.end <= held.end;
         let is_inside = is_held && rows.start >= self.plan.window / 2 && fits.len() == rows.len();
-        let places = || fits.start - held.start..fits.end - held.start;
-        // No early return, so that the loop becomes vector instructions.
-        let any = || self.status[places()].iter().fold(0, |any, flags| any | flags);
-        (is_inside && any() & Status::INVALID.bits() == 0).then_some(fits)
+        (is_inside && self.any_flags(&fits) & Status::INVALID.bits() == 0).then_some(fits)
     }
 
     /// The result whose window lies best around each of some rows, or the number of rows where there is none.
