@@ -1,6 +1,15 @@
 """Checks what users pass: every message states the rule, the value that broke it and the cure."""
 
-from tvident._arguments.arrays import along_axis, any_array, check_nan, mask, real_array, some_weights, weights
+from tvident._arguments.arrays import (
+    along_axis,
+    any_array,
+    check_nan,
+    is_read_as_it_is,
+    mask,
+    real_array,
+    some_weights,
+    weights,
+)
 from tvident._arguments.channels import as_record, channel, channels
 from tvident._arguments.containers import fields_of, is_table, package_of, plain, time_axis
 from tvident._arguments.digits import explained_in_words, ordinal, own_digits, percent, to_digits_of, with_error
@@ -73,6 +82,7 @@ __all__ = [
     "flag",
     "implied_times",
     "irregular_at_sight",
+    "is_read_as_it_is",
     "is_table",
     "is_word",
     "labels_in",

@@ -47,7 +47,7 @@ def any_array(name: str, values: npt.ArrayLike) -> npt.NDArray[np.number]:
         got = _OTHER_KINDS.get(kind, f"{array.dtype}; convert them with np.asarray({name}, dtype=float)")
         raise TypeError(f"{name} must hold numbers; got {got}")
     array = np.asarray(_filled(array))
-    if array.dtype not in _READ_AS_THEY_ARE:
+    if not is_read_as_it_is(array.dtype):
         with np.errstate(all="ignore"):
             # A long double may be too large for a double: it is infinite then, and so no sample.
             array = array.astype(np.float64)
@@ -77,6 +77,11 @@ def _filled(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
     if not isinstance(array, np.ma.MaskedArray) or array.dtype.kind not in "biuf" or not np.ma.is_masked(array):
         return array
     return np.asarray(np.ma.filled(array.astype(np.result_type(array.dtype, np.float16)), np.nan))
+
+
+def is_read_as_it_is(kind: np.dtype[Any]) -> bool:
+    """Return whether the core reads numbers of a type; others are converted."""
+    return kind in _READ_AS_THEY_ARE
 
 
 def along_axis(name: str, array: npt.NDArray[Any], axis: int) -> npt.NDArray[Any]:

@@ -30,8 +30,8 @@ def imported() -> tuple[Any, Any]:
     return dask, array
 
 
-def samples_of(name: str, values: Any) -> Any:
-    """Return a dask array of real numbers with time along its last axis.
+def samples_of(name: str, values: Any, hidden: float = np.nan) -> Any:
+    """Return a dask array of real numbers with time along its last axis; masked ones are `hidden`.
 
     Raises
     ------
@@ -42,14 +42,28 @@ def samples_of(name: str, values: Any) -> Any:
     """
     _, array = imported()
     if not isinstance(values, array.Array):
-        raise TypeError(
-            f"{name} must be a dask array; got {arguments.shown(values)}; make one with dask.array.from_array, or call tvident.identify"
-        )
-    if values.dtype.kind not in "iuf":
+        raise TypeError(f"{name} must be a dask array; got {arguments.shown(values)}; {_cure(name, values)}")
+    if values.dtype.kind not in "biuf":
         raise TypeError(f"{name} must hold real numbers; got {values.dtype}; convert it")
+    if values.ndim and np.isnan(values.size):
+        raise ValueError(
+            f"{name} must have chunks of known size; got shape {values.shape}; call {name}.compute_chunk_sizes() before"
+        )
     if not values.ndim or not values.size > 0:
         raise ValueError(f"{name} must hold samples along its last axis; got shape {values.shape}; check what was read")
-    return values
+    if isinstance(getattr(values, "_meta", None), np.ma.MaskedArray):
+        values = array.ma.filled(values.astype(np.result_type(values.dtype, np.float16)), hidden)
+    return values if arguments.is_read_as_it_is(values.dtype) else values.astype(np.float64)
+
+
+def _cure(name: str, values: Any) -> str:
+    """Return how something that is no dask array becomes one."""
+    _, array = imported()
+    if hasattr(values, "to_dask_array"):
+        return f"pass {name}.to_dask_array(lengths=True)"
+    if isinstance(getattr(values, "data", None), array.Array):
+        return f"pass {name}.data"
+    return "make one with dask.array.from_array, or call the function of tvident for arrays in memory"
 
 
 def blocks(chunks: Sequence[int], least: int) -> list[Span]:

@@ -44,7 +44,7 @@ def identify(
     ----------
     angle, torque : dask.array.Array, shape (\*, n)
         Time is the last axis; others are a batch of records. Chunks along time may have any size; those shorter than a few windows are
-        worked on together.
+        worked on together. Masked values are missing, as NaN is.
     sample_rate, delta : float
         Samples per second, or seconds from one to the next.
     weights : dask.array.Array, shape (\*, n) or (n,), optional
@@ -139,7 +139,7 @@ def identify(
 
 def _weights(weights: Any, shape: tuple[int, ...]) -> Any:
     """Return weights of samples of some shape."""
-    found = samples_of("weights", weights)
+    found = samples_of("weights", weights, hidden=0.0)
     if found.shape not in {shape, shape[-1:]}:
         raise ValueError(
             f"weights must have one value for every sample, shape {shape} or {shape[-1:]}; got {found.shape}; check what was read"

@@ -79,7 +79,8 @@ def fit_local_polynomials(
     Parameters
     ----------
     y : dask.array.Array, shape (\*, n)
-        Time is the last axis. Chunks may have any size; those shorter than three windows are worked on together.
+        Time is the last axis. Chunks may have any size; those shorter than three windows are worked on together. Masked values are
+        missing, as NaN is.
     window_length : int or str
         Samples in a window, or a duration such as ``"0.2 s"``.
     delta, sample_rate, max_order, order, criterion, selection, max_deriv, step, quantisation : optional
@@ -131,6 +132,11 @@ def fit_local_polynomials(
     seconds = arguments.sample_period(y.shape[-1], delta=delta, sample_rate=sample_rate)
     arguments.one_of("criterion", criterion, get_args(Criterion))
     arguments.one_of("selection", selection, get_args(Selection))
+    if window_length == "auto":
+        raise ValueError(
+            "window_length must be samples or a duration where the record is in blocks; got 'auto'; have it chosen from a part in memory: "
+            "tvident.fit_local_polynomials(part, 'auto').window_length"
+        )
     length = arguments.window_length("window_length", window_length, seconds, odd=True)
     arguments.check_window("window_length", length, y.shape[-1], least=SHORTEST_WINDOW)
     every = arguments.whole_number("step", step, least=1)
