@@ -5,21 +5,18 @@ from __future__ import annotations
 import json
 import math
 import os
-import re
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import tvident
-from tvident._live import Inlet, LiveClock, Outlet
+from tvident._live import Inlet, Outlet
 
 SECONDS = float(os.environ.get("TVIDENT_LIVE", "10"))
 """Of the test with a real outlet at 1 kHz; a minute in ``make test-live``."""
@@ -119,100 +116,6 @@ def test_a_table_and_a_counter() -> None:
     assert 3 <= len(done.stdout.splitlines()) <= 8
     assert "lost samples: 3" in done.stderr
     assert "samples: 2000 taken in" in done.stderr
-
-
-def clocked(stamps: Sequence[float], period: float = 1e-3) -> tuple[LiveClock, list[float]]:
-    """Give a clock that saw these stamps, and which samples came out: NaN for lost ones."""
-    clock = LiveClock(period)
-    rows = [row for number, stamp in enumerate(stamps) for row in clock.rows((stamp, float(number), 0.0))]
-    return clock, [row[1] for row in [*rows, *clock.rest()]]
-
-
-def test_losses_are_found_where_they_are_and_jitter_is_none() -> None:
-    generator = np.random.default_rng(1)
-    stamps = np.arange(20_000) * 1e-3 * (1 + 80e-6) + 7.0
-    jittered = stamps + 0.2e-3 * generator.uniform(-1, 1, stamps.size)
-    held = jittered.copy()
-    held[5000:5006] = held[5006]  # a driver that gives six at once
-    clock, numbers = clocked(held.tolist())
-    assert (clock.lost, len(numbers)) == (0, 20_000)
-    assert clock.rate.period == pytest.approx(1e-3 * (1 + 80e-6), abs=5 * clock.rate.error)
-    assert clock.rate.error < 1e-8
-    gone = np.delete(jittered, [*range(3000, 3004), 12_000])
-    clock, numbers = clocked(gone.tolist())
-    assert clock.lost == 5
-    lost = np.flatnonzero(np.isnan(numbers))
-    assert np.array_equal(lost, [3000, 3001, 3002, 3003, 12_000])
-    assert clock.rate.period == pytest.approx(1e-3 * (1 + 80e-6), abs=5 * clock.rate.error)
-    assert re.search(r"drift -(79|80)\.", "\n".join(clock.words()))
-
-
-def test_samples_that_came_twice_and_clocks_that_were_set_keep_windows_apart() -> None:
-    stamps = np.arange(6000) * 1e-3 + 7.0
-    twice = np.insert(stamps, 3000, stamps[2990:3000])
-    set_back, set_forward = (stamps + np.where(np.arange(6000) < 3000, 0.0, by) for by in (-50.0, 5000.0))
-    faster = np.r_[stamps[:3000], stamps[3000] + np.arange(3000) * 5e-4]
-    for given, repeated, jumps, said in (
-        (twice, 10, 0, "10 samples more came"),
-        (set_back, 0, 1, "jumped 1 times"),
-        (set_forward, 0, 1, "jumped 1 times"),
-    ):
-        clock, numbers = clocked(given.tolist())
-        assert (clock.lost, clock.repeated, clock.jumps) == (0, repeated, jumps)
-        assert np.array_equal(np.flatnonzero(np.isnan(numbers)), [3000])
-        assert said in "\n".join(clock.words())
-        assert clock.rate.period == pytest.approx(1e-3, rel=1e-9)
-    clock, numbers = clocked(faster.tolist())
-    assert clock.repeated == pytest.approx(1500, abs=2)
-    # No window of more than three samples holds none that is missing.
-    assert np.diff(np.flatnonzero(np.isnan(numbers))).max() <= 3
-    # Samples of one buffer have one stamp, and come out as they came.
-    for place in (0, 31):
-        clock, numbers = clocked(np.repeat(stamps[place::32], 32)[:5900].tolist())
-        assert (clock.lost, clock.repeated, len(numbers)) == (0, 0, 5900)
-    clock, _ = clocked([*stamps[:3000], stamps[3001], stamps[3000], *stamps[3002:]])
-    assert "1 stamps are before the one that came last" in "\n".join(clock.words())
-    clock, _ = clocked((1000 * stamps[:100]).tolist())
-    assert "say their unit" in "\n".join(clock.words())
-
-
-def test_samples_without_a_stamp_keep_their_places() -> None:
-    stamps = np.delete(np.arange(6000) * 1e-3 + 7.0, slice(3020, 3030))
-    stamps[3001:3040] = np.nan
-    stamps[3045] = np.nan
-    _, numbers = clocked(stamps.tolist())
-    there = np.array(numbers)[~np.isnan(numbers)]
-    assert np.array_equal(there, np.arange(5990))
-
-
-def test_counters_that_begin_anew_repeat_or_overtake() -> None:
-    numbers, stamps = np.arange(2000), np.arange(2000) * 1e-3
-
-    def counted(order: npt.NDArray[np.int_], counter: npt.NDArray[np.int_]) -> tuple[LiveClock, list[float]]:
-        clock = LiveClock(1e-3)
-        rows = [
-            row
-            for number, count in zip(order.tolist(), counter.tolist(), strict=True)
-            for row in clock.rows((float(stamps[number]), float(number), 0.0), float(count))
-        ]
-        return clock, [row[1] for row in rows]
-
-    # Eight bits: 253 to 257 are lost where the counter begins anew.
-    some = np.delete(numbers, slice(253, 258))
-    clock, found = counted(some, some % 256)
-    assert (clock.lost, clock.jumps, len(found)) == (5, 0, 2000)
-    assert np.array_equal(np.flatnonzero(np.isnan(found)), np.arange(253, 258))
-    # One came twice, and one too late for its place.
-    order = np.r_[numbers[:900], 899, numbers[900:1000], 1001, 1000, numbers[1002:]]
-    clock, found = counted(order, order)
-    assert (clock.lost, clock.repeated, clock.jumps, len(found)) == (1, 2, 0, 2000)
-    assert np.array_equal(np.flatnonzero(np.isnan(found)), [1000])
-    assert np.array_equal(np.delete(found, 1000), np.delete(numbers, 1000))
-
-
-def test_a_rate_that_is_not_the_nominal_one_is_said() -> None:
-    clock, _ = clocked((np.arange(5000) / 990).tolist())
-    assert "give --sample-rate 990" in "\n".join(clock.words())
 
 
 def test_what_cannot_be_read_is_missing_and_said() -> None:
@@ -335,14 +238,6 @@ def test_a_real_outlet_loses_nothing_and_comes_back_with_the_stated_delay() -> N
     assert not math.isnan(found[count // 2])
 
 
-def test_few_losses_by_a_counter_alone_are_no_wrong_rate() -> None:
-    clock = LiveClock(0.001)
-    for number in (count for count in range(1000) if count % 100):
-        clock.rows((math.nan, 1.0, 2.0), number)
-    assert clock.lost == 9
-    assert not any("more samples are missing" in said for said in clock.words())
-
-
 def test_a_damaged_byte_is_a_lost_sample() -> None:
     """A NUL anywhere in the first block ended the session."""
     rows = [f"{a!r},{b!r}\n" for a, b in zip(RIG.angle[:900].tolist(), RIG.torque[:900].tolist(), strict=True)]
@@ -352,50 +247,81 @@ def test_a_damaged_byte_is_a_lost_sample() -> None:
     assert "1 lines could not be read and count as missing" in words
 
 
-def test_stamps_of_another_rate_are_said_at_once() -> None:
-    clock, _ = clocked((np.arange(400) / 1000).tolist(), period=1 / 500)
-    words = "stamps show 1000 Hz, not 500: parameters are wrong; give --sample-rate 1000"
-    assert words in clock.comes_faster
-    assert words in clock.words()[0]
-    twice, _ = clocked(np.repeat(np.arange(2000) / 1000, np.where(np.arange(2000) % 10, 1, 2)).tolist())
-    assert not twice.comes_faster
+def test_samples_that_came_twice_with_their_stamps_are_left_out() -> None:
+    """They were samples, and the parameters of their windows those of another motion."""
+    order = np.repeat(np.arange(900), np.where(np.arange(900) % 50, 1, 2))
+    angle, torque = RIG.angle.tolist(), RIG.torque.tolist()
+    rows = [f"{n / 1000!r},{angle[n]!r},{torque[n]!r}\n" for n in order.tolist()]
+    options = ("--time", "0", "--angle", "1", "--torque", "2", "--sample-rate", "1000")
+    found, words = run("".join(rows), *options)
+    once, _ = run("".join(rows[int(k)] for k in np.flatnonzero(np.diff(order, prepend=-1))), *options)
+    assert found == once
+    assert "18 samples came twice" in words
+    assert "lost samples: 0" in words
 
 
-@pytest.mark.parametrize("every", [1, 5])
-def test_lines_that_come_twice_are_no_higher_rate(every: int) -> None:
-    """Where every line came twice, `--sample-rate 2001.022` was to be given."""
-    numbers = np.arange(4000)
-    order = np.repeat(numbers, np.where(numbers % every, 1, 2)).tolist()
-    clock, counted = LiveClock(1e-3), LiveClock(1e-3)
-    for number in order:
-        row = (number * 1e-3, math.sin(number), math.nan)
-        clock.rows(row)
-        counted.rows(row, float(number))
-        assert not clock.comes_faster
-        assert not counted.comes_faster
-    assert clock.repeated == pytest.approx(4000 / every, abs=20)
-    assert counted.repeated == 4000 / every
-    assert "samples more came" in "\n".join(clock.words())
+def test_a_damaged_byte_in_the_first_line_is_a_lost_sample() -> None:
+    """A NUL there was UTF-16, and ended the session."""
+    rows = [f"{a!r},{b!r}\n" for a, b in zip(RIG.angle[:900].tolist(), RIG.torque[:900].tolist(), strict=True)]
+    rows[0] = "0.\0" + rows[0][3:]
+    found, words = run("".join(rows), "--angle", "0", "--torque", "1", "--sample-rate", "1000")
+    assert len(found) == 900
+    assert "1 lines could not be read and count as missing" in words
 
 
-def test_buffers_whose_samples_are_equal_are_counted_whole() -> None:
-    clock = LiveClock(1 / 500)
-    for number in range(2000):
-        # At rest but for one sample of a buffer of eight.
-        clock.rows((number // 8 * 8e-3, float(number % 8 == 7), 0.0))
-    assert "give --sample-rate 100" in clock.comes_faster
+def test_a_name_that_two_channels_have_is_refused() -> None:
+    """The first of them was taken, without a word."""
+    done = session(
+        "angle,torque,angle\n" + "1,2,3\n" * 5, "--angle", "angle", "--torque", "torque", "--sample-rate", "1"
+    )
+    assert done.returncode != 0
+    assert "got 'angle', which 2 have; give the number of one, 0 or 2" in done.stderr
 
 
-def test_what_came_twice_before_the_clock_was_set_says_nothing_of_the_rate() -> None:
-    """Two buffers of one stamp each look like a higher rate."""
-    clock = LiveClock(1e-3)
-    for number in range(4000):
-        clock.rows((number // 2 * 1e-3, float(number), 0.0))
-    assert clock.comes_faster
-    for number in range(300):
-        clock.rows((-100 + number // 150 * 0.15, float(number), 0.0))
-        assert not clock.comes_faster
-    assert clock.repeated > 1000
+def test_streams_of_one_name_and_channels_of_one_label_are_refused() -> None:
+    """The first that answered was taken, without a word."""
+    pylsl = pytest.importorskip("pylsl")
+    name = f"tvident-twins-{os.getpid()}"
+
+    def outlet(source: str) -> Any:
+        info = pylsl.StreamInfo(name, "Rig", 3, 1000.0, pylsl.cf_string, source)
+        info.set_channel_labels(["angle", "torque", "angle"])
+        return pylsl.StreamOutlet(info)
+
+    first = outlet(f"{name}-1")
+    with pytest.raises(ValueError, match="which 2 have; give the number of one, 0 or 2"):
+        Inlet(name, ["angle", "torque"])
+    inlet = Inlet(name, ["0", "torque"])
+    pieces = inlet.pieces(0.05)
+    while not first.have_consumers():
+        time.sleep(0.01)
+    first.push_sample(["1.5", "2.5", "x"])
+    first.push_sample(["off", "2.5", "x"])
+    came: list[list[float]] = []
+    while len(came) < 2:
+        came += next(pieces)
+    assert came[0][1:] == [1.5, 2.5]
+    assert math.isnan(came[1][1])
+    assert (inlet.read, inlet.unreadable) == (1, 1)
+    second = outlet(f"{name}-2")
+    with pytest.raises(ValueError, match=f"got 2 with name '{name}'; give one of source_id={name}-"):
+        Inlet(name, ["0", "torque"])
+    del second
+
+
+def test_silence_and_a_stream_that_is_its_own_input_are_said() -> None:
+    command = [sys.executable, "-m", "tvident", "live", "--angle", "0", "--torque", "1", "--sample-rate", "1000"]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as program:
+        assert program.stdin is not None
+        assert program.stderr is not None
+        program.stdin.write("1,2\n3,4\n")
+        program.stdin.flush()
+        assert "nothing has come for 5 s; waiting for more; Ctrl-C ends" in program.stderr.readline()
+    done = session("", "--lsl", "rig", "--lsl-output", "rig", "--angle", "0", "--torque", "1")
+    assert done.returncode == 2
+    assert "--lsl-output must have a name of its own" in done.stderr
 
 
 @pytest.mark.parametrize(

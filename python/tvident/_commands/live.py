@@ -23,6 +23,9 @@ from tvident._units import ROTARY, factor_to
 _WAIT = 0.05
 """Seconds between two looks at the clock while nothing comes."""
 
+_SILENT = 5.0
+"""Seconds without a sample after which that is said."""
+
 
 # Options that need work before they are passed on are parameters of their own.
 def live(
@@ -50,6 +53,10 @@ def live(
     names = [name for name in (time_channel, angle, torque, counter) if name is not None]
     if lsl is not None and time_channel is not None:
         raise click.UsageError("--time is for lines; got it with --lsl, whose samples have stamps; leave it out")
+    if lsl is not None and lsl == lsl_output:
+        raise click.UsageError(
+            f"--lsl-output must have a name of its own; got {lsl!r} for both streams; choose another"
+        )
     inlet = None if lsl is None else Inlet(lsl, names)
     rate = sample_rate or (inlet.nominal_rate if inlet is not None else 0.0)
     if not rate > 0:
@@ -98,21 +105,24 @@ def live(
         outlet.close()
     for words in session.words():
         click.echo(words, err=True)
-    if isinstance(source, Lines):
-        _say_read(source)
+    _say_read(source)
 
 
-def _say_read(lines: Lines) -> None:
-    """Say which lines could not be read; end with an error where that is all of them, or none came."""
-    if lines.unreadable:
+def _say_read(source: Inlet | Lines) -> None:
+    """Say which samples could not be read; end with an error where that is all of them, or none came."""
+    has_lines = isinstance(source, Lines)
+    if source.unreadable:
         click.echo(
-            f"{lines.unreadable} lines could not be read and count as missing; the first is {lines.first_unreadable}",
+            f"{source.unreadable} {'lines' if has_lines else 'samples'} could not be read and count as missing; the first is "
+            f"{source.first_unreadable}",
             err=True,
         )
-    if not lines.read:
+    if not source.read and has_lines:
         raise click.ClickException(
             "lines must hold the channels; got none that does; look at what is piped, and at --angle and --torque"
         )
+    if not source.read:
+        raise click.ClickException("a stream must send samples with numbers; got none; look at its outlet")
 
 
 def _begun(names: Sequence[str], duration: float | None) -> Lines:
@@ -144,9 +154,15 @@ def _run(
 ) -> None:
     """Take pieces until the source ends, time is up, or Ctrl-C."""
     end = math.inf if duration is None else time.monotonic() + duration
-    is_said = False
+    is_said = is_silent = False
+    heard = time.monotonic()
     try:
         for piece in pieces:
+            now = time.monotonic()
+            heard, is_silent = (now, False) if piece else (heard, is_silent)
+            if not is_silent and now - heard > _SILENT:
+                is_silent = True
+                click.echo(f"nothing has come for {_SILENT:g} s; waiting for more; Ctrl-C ends", err=True)
             session.take(piece, has_counter=has_counter)
             if not is_said and session.clock.comes_faster:
                 is_said = True

@@ -73,7 +73,8 @@ class LiveClock:
 
     A stamp that is late alone, since a driver held it back, is followed by ones that are not; after a loss all are late, and after
     samples that came twice all are early. So a stamp that is off waits for the next 16, and whole periods that all of them are late are
-    lost samples. With a counter nothing has to wait. Where samples came twice or the clock was set, one NaN keeps windows apart.
+    lost samples. With a counter nothing has to wait. Where samples came twice or the clock was set, one NaN keeps windows apart; a
+    sample that comes twice with its stamp is left out, unless the next stamp says that both are of one buffer.
 
     Parameters
     ----------
@@ -84,9 +85,9 @@ class LiveClock:
     ----------
     rate : Rate
         Since the clock was set.
-    lost, repeated, jumps, back : int
-        Samples that did not come and that came twice or too late, how often clock or counter were set, and stamps that are before the
-        last one by half a period or more.
+    lost, repeated, jumps, back, twice : int
+        Samples that did not come and that came twice or too late, how often clock or counter were set, stamps that are before the last
+        one by half a period or more, and samples that were left out since they came twice with their stamps.
     """
 
     def __init__(self, period: float) -> None:
@@ -101,15 +102,36 @@ class LiveClock:
         self._highest = self._came = 0
         self.rate = Rate()
         self._newest = math.nan
-        self.lost = self.repeated = self.jumps = self.back = 0
+        self._latest: Row = (math.nan,) * 3
+        self._alike: list[Row] = []
+        """Samples that are like the one before them, stamp and values, until the next stamp says what they are."""
+        self.lost = self.repeated = self.jumps = self.back = self.twice = 0
 
     def rows(self, row: Row, counter: float | None = None) -> list[Row]:
         """Take a sample, and return those that are in order now."""
+        if counter is not None:
+            return self._next_rows(row, counter)
+        if row[0] == self._latest[0] and not _differ(row, self._latest):
+            self._alike.append(row)
+            return self._of_alike(came_twice=False) if len(self._alike) > _WAIT else []
+        step, self._latest = (row[0] - self._latest[0]) / self._seconds(), row
+        return [*self._of_alike(came_twice=_MOVES < step < 1 + _HALF), *self._next_rows(row)]
+
+    def _of_alike(self, *, came_twice: bool) -> list[Row]:
+        """Return what is in order of samples that are alike: nothing where they came twice."""
+        alike, self._alike = self._alike, []
+        if came_twice:
+            self.twice += len(alike)
+            return []
+        return [one for row in alike for one in self._next_rows(row)]
+
+    def _next_rows(self, row: Row, counter: float | None = None) -> list[Row]:
+        """Take a sample that is none that came before, and return those that are in order now."""
         if math.isfinite(row[0]):
             self._begin = row[0] if math.isnan(self._begin) else self._begin
             self._stamped += 1
             if row[0] == self._before[0]:
-                differs = any(abs(one - other) > 0 for one, other in zip(row[1:], self._before[1:], strict=True))
+                differs = _differ(row, self._before)
                 self._has_buffers |= differs
                 self._same += not differs
             self._newest, self._before = row[0], row
@@ -122,7 +144,7 @@ class LiveClock:
         off = self._off(row, len(self._waiting))
         if step < -_WAIT:
             # Nothing before it says when this one is due.
-            return [*self.rest(), *self._jumped(row[0]), self._taken(row)]
+            return [*self._settled_at_last(), *self._jumped(row[0]), self._taken(row)]
         is_due = not abs(off) >= _HALF or -_MOVES < step < _MOVES
         if not self._waiting and is_due:
             return [self._taken(row)]
@@ -131,6 +153,11 @@ class LiveClock:
 
     def rest(self) -> list[Row]:
         """Return what still waits, at the end: samples of one buffer say nothing of what was lost."""
+        found = self._of_alike(came_twice=not self._has_buffers)
+        return [*found, *self._settled_at_last()]
+
+    def _settled_at_last(self) -> list[Row]:
+        """Return what waits for stamps that do not come any more."""
         found: list[Row] = []
         while self._waiting:
             if self._waiting[-1][0] - self._waiting[0][0] < _MOVES * self._seconds():
@@ -253,6 +280,8 @@ class LiveClock:
             said.append(
                 "more samples are missing than came: check the sample rate, and that times are in seconds or say their unit"
             )
+        if self.twice:
+            said.append(f"{self.twice} samples came twice, with the same stamp and the same values: left out")
         if self.repeated:
             said.append(
                 f"{self.repeated} samples more came than their stamps or numbers have room for: repeated, late, or of another rate"
@@ -264,6 +293,11 @@ class LiveClock:
         if self.jumps:
             said.append(f"the counter or clock jumped {self.jumps} times: no window goes over that")
         return said
+
+
+def _differ(row: Row, other: Row) -> bool:
+    """Return whether values differ; what is missing in one of them says nothing."""
+    return any(abs(one - two) > 0 for one, two in zip(row[1:], other[1:], strict=True))
 
 
 def _apart(stamp: float) -> Row:

@@ -17,6 +17,8 @@ from tvident._units import is_unit, named_unit
 _BLOCK = 1 << 16
 _DAMAGED = 1e-3
 """Of the bytes of a text, at most: of random bytes one of 256 is NUL."""
+_OTHER_ALPHABET = 0.25
+"""Of the bytes of the first line, at least: in UTF-16 every other byte of a number is NUL."""
 _LONGEST = 1 << 20
 """Bytes of a line."""
 
@@ -121,8 +123,9 @@ class Lines:
         return True
 
     def _first(self, begin: int) -> int | None:
-        """Return the first waiting line that says something."""
-        return next((place for place in range(begin, len(self._early)) if _says_something(self._early[place])), None)
+        """Return the first waiting line that says something; one that was damaged is no header and no number of cells."""
+        waiting = range(begin, len(self._early))
+        return next((k for k in waiting if _says_something(self._early[k]) and "\0" not in self._early[k]), None)
 
     def _row(self, line: str) -> list[float] | None:
         """Return the numbers of a line; None if it has none."""
@@ -141,7 +144,8 @@ class Lines:
 
 def _is_no_text(block: bytes) -> bool:
     """Return whether what comes first is UTF-16 or packed, and not text in which a byte was damaged."""
-    return b"\0" in block.split(b"\n", 1)[0] or block.count(b"\0") > len(block) * _DAMAGED
+    first = block.split(b"\n", 1)[0]
+    return first.count(b"\0") > len(first) * _OTHER_ALPHABET or block.count(b"\0") > max(1, len(block) * _DAMAGED)
 
 
 def _says_something(line: str) -> bool:
@@ -181,11 +185,22 @@ def _is_number(cell: str) -> bool:
     return True
 
 
+def check_one(name: str, names: Sequence[str]) -> None:
+    """Check that no more than one channel has a name."""
+    places = [str(place) for place, one in enumerate(names) if one == name]
+    if len(places) > 1:
+        raise ValueError(
+            f"a name must be that of one channel; got {name!r}, which {len(places)} have; give the number of one, "
+            f"{', '.join(places[:-1])} or {places[-1]}"
+        )
+
+
 def _places(names: Sequence[str], header: Sequence[str] | None, count: int) -> list[int]:
     """Return the columns of channels."""
     plain = [named_unit(cell)[0] for cell in header or ()]
     places = []
     for name in names:
+        check_one(name, plain if name not in (header or ()) else header or ())
         if header is not None and name in header:
             places.append(list(header).index(name))
         elif name in plain:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from tvident._live.lines import check_one
 from tvident._units import unit_of
 
 _MOST = 4096
@@ -13,6 +15,9 @@ _MOST = 4096
 
 _BUFFERED = 360
 """Seconds that an inlet keeps."""
+
+_SECOND = 0.5
+"""Seconds in which a second device answers to a name that a first has answered to."""
 
 _UNDER_WAY = 1.0
 """Seconds that samples take to who listens: what an outlet has not sent when it goes is lost."""
@@ -39,6 +44,13 @@ class Inlet:
         Channels by label, or by number from 0.
     timeout : float
         Seconds to look for the stream.
+
+    Attributes
+    ----------
+    read, unreadable : int
+        Samples with numbers, and those of a stream of text without, which are missing.
+    first_unreadable : str
+        One of them.
     """
 
     def __init__(self, name: str, names: Sequence[str], timeout: float = 10.0) -> None:
@@ -51,10 +63,24 @@ class Inlet:
             raise ValueError(
                 f"a stream must be on the network; got none with {key} {value!r} within {timeout:g} s; start its outlet first"
             )
+        if len(found) == 1:
+            found = pylsl.resolve_byprop(key, value, minimum=2, timeout=_SECOND) or found
+        if len(found) > 1:
+            there = ", ".join(f"source_id={one.source_id()} at {one.hostname()}" for one in found)
+            raise ValueError(
+                f"a name must be that of one stream; got {len(found)} with {key} {value!r}; give one of {there}, or stop the others"
+            )
         # Stamps are brought to this machine's clock; smoothing them would hide what was lost.
         self._inlet = pylsl.StreamInlet(found[0], max_buflen=_BUFFERED, processing_flags=pylsl.proc_clocksync)
         self._lost = pylsl.util.LostError
-        info = self._inlet.info(timeout=timeout)
+        self.read = self.unreadable = 0
+        self.first_unreadable = ""
+        try:
+            info = self._inlet.info(timeout=timeout)
+        except (self._lost, pylsl.util.TimeoutError):
+            raise ValueError(
+                f"a stream must say its channels; got nothing from {key} {value!r} within {timeout:g} s; start its outlet again"
+            ) from None
         self.nominal_rate: float = info.nominal_srate()
         self._places = _places(info, names)
         of_channels = [_unit(one) for one in info.get_channel_units() or ()]
@@ -69,10 +95,18 @@ class Inlet:
                 samples, stamps = self._inlet.pull_chunk(timeout=wait, max_samples=_MOST, min_samples=1)
             except self._lost:
                 return
-            yield [
-                [stamp, *(float(sample[place]) for place in self._places)]
-                for sample, stamp in zip(samples, stamps, strict=True)
-            ]
+            yield [[stamp, *self._numbers(sample)] for sample, stamp in zip(samples, stamps, strict=True)]
+
+    def _numbers(self, sample: Sequence[Any]) -> list[float]:
+        """Return the numbers of the channels; a stream may hold text."""
+        try:
+            numbers = [float(sample[place]) for place in self._places]
+        except ValueError:
+            self.unreadable += 1
+            self.first_unreadable = self.first_unreadable or repr([sample[place] for place in self._places])[:80]
+            return [math.nan] * len(self._places)
+        self.read += 1
+        return numbers
 
 
 def _unit(said: Any) -> str:
@@ -87,6 +121,7 @@ def _places(info: Any, names: Sequence[str]) -> list[int]:
     count = info.channel_count()
     places = []
     for name in names:
+        check_one(name, labels)
         if name in labels:
             places.append(labels.index(name))
         elif name.isdigit() and int(name) < count:
