@@ -97,11 +97,40 @@ def test_power_goes_where_it_tells_most() -> None:
         ({"band": (3, 1)}, "must rise"),
         ({"band": None}, r"band=\(0.5, 12\)"),
         ({"torque_rms": None}, "torque or the time"),
+        ({"band": 5}, "lowest and the highest frequency; got 5"),
+        ({"band": "0.5 12"}, "lowest and the highest frequency; got 0.5 12"),
     ],
 )
 def test_what_is_missing_is_said(changed: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         tvident.plan_experiment(**{**GUESS, "torque_noise": 0.02, "torque_rms": 0.1, **changed})
+
+
+def test_what_would_be_ignored_is_refused() -> None:
+    """A guess beside a result was, without a word, and so was `more` without one."""
+    rig = tvident.simulate_torsional_rig(duration=4.0)
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
+    with pytest.raises(TypeError, match="got result= and inertia=, band=; leave out one"):
+        tvident.plan_experiment(result=result, inertia=0.01, band=(1, 2))
+    with pytest.raises(TypeError, match="more must go with result="):
+        tvident.plan_experiment(**GUESS, torque_noise=0.02, torque_rms=0.1, more=5)
+    ran = run("plan", "one.npz", "--inertia", "0.01")
+    assert ran.returncode == 2
+    assert "got 'one.npz' and --inertia; leave out one of them" in ran.stderr
+    assert run("plan", "--inertia", "0.01", "--more", "5").returncode == 2
+
+
+def test_a_torque_has_the_frequencies_of_its_plan_or_is_refused() -> None:
+    """Sines beyond half the rate came out as others, and a plan to go on with a recording as zeros."""
+    plan = tvident.plan_experiment(**GUESS, torque_noise=0.02, torque_rms=0.1)
+    with pytest.raises(ValueError, match="more than twice the highest frequency, 12 Hz; got 5 Hz; raise it"):
+        plan.excitation(sample_rate=5)
+    with pytest.raises(ValueError, match="seed must be at least 0; got -1"):
+        plan.excitation(sample_rate=100, seed=-1)
+    rig = tvident.simulate_torsional_rig(duration=4.0)
+    longer = tvident.plan_experiment(result=tvident.identify(rig.angle, rig.torque, sample_rate=1000))
+    with pytest.raises(ValueError, match="one to go on with a recording"):
+        longer.excitation(sample_rate=100)
 
 
 def test_units_are_those_of_the_axis(tmp_path: Any) -> None:

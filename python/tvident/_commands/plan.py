@@ -35,6 +35,11 @@ def plan(
             )
         if output is not None:
             raise click.UsageError("a plan to go on has no torque to write; got -o; leave it out")
+        others = [f"--{name.replace('_', '-')}" for name in asked if name not in {"wanted", "more"}]
+        if others:
+            raise click.UsageError(
+                f"a plan is of a guess or of a result; got '{printable(file)}' and {', '.join(others)}; leave out one of them"
+            )
         kept = {name: asked[name] for name in ("wanted", "more") if name in asked}
         _show(tvident.plan_experiment(result=tvident.load(file), **kept), as_json=as_json)
         return
@@ -43,6 +48,8 @@ def plan(
             "a plan needs a guess of the system, or a result; got neither; give --inertia, --damping, --stiffness, --band and "
             "--torque-noise, or a FILE that identify saved as .npz or .parquet"
         )
+    if "more" in asked:
+        raise click.UsageError("--more goes with FILE, which it is added to; got none; give --duration instead")
     found = tvident.plan_experiment(**asked)
     _show(found, as_json=as_json)
     if output is not None:

@@ -28,6 +28,9 @@ _SMALLEST = 1e-24
 _LEAST_SHARE = 0.01
 """Lines with less than this part of the power are left out."""
 
+_MORE = 60.0
+"""Seconds that are recorded in addition where nothing is said."""
+
 _LONGEST = 1e7
 """Seconds: a third of a year."""
 
@@ -52,7 +55,7 @@ def plan_experiment(
     angle_unit: str | None = None,
     torque_unit: str | None = None,
     result: Identification | None = None,
-    more: float = 60.0,
+    more: float | None = None,
 ) -> ExperimentPlan:
     r"""Plan an experiment: how long, which frequencies and which amplitude, for a wanted error of the stiffness.
 
@@ -91,7 +94,7 @@ def plan_experiment(
     result : Identification, optional
         Of a recording at hand, instead of all of these but `wanted`.
     more : float, optional
-        Seconds that would be recorded in addition.
+        Seconds that would be recorded in addition to that of `result`, by default 60.
 
     Returns
     -------
@@ -104,6 +107,8 @@ def plan_experiment(
     ValueError
         If a number is missing or not positive, the band is none or beyond half the sample rate, neither a duration nor a torque is
         given, or units are unknown or of different axes.
+    TypeError
+        If a result is given beside a guess, or `more` without a result.
 
     Notes
     -----
@@ -132,12 +137,16 @@ def plan_experiment(
     True
     """
     wanted = arguments.positive_number("wanted", wanted)
-    if result is not None:
-        return _longer(result, wanted, arguments.positive_number("more", more))
+    of_guess = {"duration": duration, "torque_rms": torque_rms, "resolution": resolution}
     given = {"inertia": inertia, "damping": damping, "stiffness": stiffness, "torque_noise": torque_noise}
+    _check_one_source(
+        result, more, {**given, **of_guess, "band": band, "angle_unit": angle_unit, "torque_unit": torque_unit}
+    )
+    if result is not None:
+        return _longer(result, wanted, _MORE if more is None else arguments.positive_number("more", more))
     numbers = {name: _needed(name, one) for name, one in given.items()}
     _check_size(given | {"wanted": wanted, "angle_noise": angle_noise or None, "sample_rate": sample_rate})
-    _check_size({"duration": duration, "torque_rms": torque_rms, "resolution": resolution})
+    _check_size(of_guess)
     rate = arguments.positive_number("sample_rate", sample_rate)
     low, high = _band(band, rate)
     axis = axis_of(None, None, angle_unit=angle_unit, torque_unit=torque_unit)
@@ -180,6 +189,19 @@ def plan_experiment(
     )
 
 
+def _check_one_source(result: Identification | None, more: float | None, of_guess: Mapping[str, object]) -> None:
+    """Check that a plan is of a result, or of a guess."""
+    there = [f"{name}=" for name, one in of_guess.items() if one is not None]
+    if result is not None and there:
+        raise TypeError(
+            f"a plan must be of a guess or of a result; got result= and {', '.join(there)}; leave out one of them"
+        )
+    if result is None and more is not None:
+        raise TypeError(
+            "more must go with result=, the recording that it is added to; got none; give duration= instead"
+        )
+
+
 def _needed(name: str, value: float | None) -> float:
     if value is None:
         raise ValueError(f"a plan needs a guess of {name}; got none; give {name}=, or result= of a recording at hand")
@@ -196,7 +218,7 @@ def _check_size(numbers: Mapping[str, float | None]) -> None:
 
 
 def _band(band: Sequence[float] | None, rate: float) -> tuple[float, float]:
-    if band is None or len(band) != 2:  # noqa: PLR2004 - its ends
+    if band is None or isinstance(band, str) or np.shape(band) != (2,):
         raise ValueError(f"band must be the lowest and the highest frequency; got {band}; give band=(0.5, 12), say")
     low, high = (arguments.positive_number("band", one) for one in band)
     _check_size({"band": low})

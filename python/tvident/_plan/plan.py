@@ -81,7 +81,7 @@ class ExperimentPlan:
         Parameters
         ----------
         sample_rate : float
-            Samples per second.
+            Samples per second, more than twice the highest frequency.
         seed : int, optional
             Of the phases.
 
@@ -89,6 +89,11 @@ class ExperimentPlan:
         -------
         ndarray of float64, shape (duration times sample_rate,)
             In N m, or N of an axis that slides.
+
+        Raises
+        ------
+        ValueError
+            If the rate is too low for the frequencies, or the plan is to go on with a recording and has none.
 
         See Also
         --------
@@ -100,8 +105,19 @@ class ExperimentPlan:
         R. Pintelon, J. Schoukens: System identification, a frequency domain approach (2012): random-phase multisines.
         """
         rate = arguments.positive_number("sample_rate", sample_rate)
+        if not self.frequencies.size:
+            raise ValueError(
+                "a torque must be of a plan with frequencies; got one to go on with a recording; go on as before, or plan from a guess"
+            )
+        if not rate > 2 * self.frequencies[-1]:
+            raise ValueError(
+                f"sample_rate must be more than twice the highest frequency, {self.frequencies[-1]:.4g} Hz; got {rate:g} Hz; raise it, or "
+                "plan with a lower band"
+            )
         time = np.arange(round(self.duration * rate)) / rate
-        phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, self.frequencies.size)
+        phases = np.random.default_rng(arguments.whole_number("seed", seed, least=0)).uniform(
+            0, 2 * np.pi, self.frequencies.size
+        )
         found = np.zeros(time.size)
         for frequency, amplitude, phase in zip(self.frequencies, self.amplitudes, phases, strict=True):
             found += amplitude * np.sin(2 * np.pi * frequency * time + phase)
