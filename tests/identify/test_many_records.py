@@ -192,3 +192,84 @@ def test_an_error_of_one_record_names_it_and_one_of_progress_does_not() -> None:
         found[2]
     with pytest.raises(TypeError, match="one of the 2 records, or a slice; got 'x'"):
         cast("Any", found)["x"]
+
+
+def of_different_lengths() -> tuple[list[Array], list[Array]]:
+    rigs = [tvident.simulate_torsional_rig(duration=seconds, seed=seed) for seed, seconds in enumerate((2.0, 3.0, 2.5))]
+    return [rig.angle for rig in rigs], [rig.torque for rig in rigs]
+
+
+def test_a_lag_may_be_one_a_record() -> None:
+    """It was refused with words of "1 records"."""
+    angles, torques = of_different_lengths()
+    found = tvident.identify(angles, torques, sample_rate=1000, lag=[0.0, "1 ms", 0.0])
+    assert [one.settings["lag"] for one in found] == [0.0, 0.001, 0.0]
+    again = tvident.identify(angles, torques, sample_rate=1000, lag=np.array([0.0, 1e-3, 0.0]))
+    assert np.array_equal(found[1].stiffness, again[1].stiffness)
+    with pytest.raises(ValueError, match="got 2 of lag for 3; give one a record"):
+        tvident.identify(angles, torques, sample_rate=1000, lag=[0.0, 0.0])
+    batch = tvident.identify([angles[0]] * 2, [torques[0]] * 2, sample_rate=1000, lag=np.array([0.0, 1e-3]))
+    assert batch.settings["lag"] == [0.0, 0.001]
+    with pytest.raises(ValueError, match="'auto' for all records of one length, or for none"):
+        tvident.identify([angles[0]] * 2, [torques[0]] * 2, sample_rate=1000, lag=["auto", 0.0])
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        ({"sample_rate": 0}, "sample_rate must be positive and finite; got 0; pass a number above zero"),
+        ({"stiffness": "konst"}, "stiffness must be .*; got 'konst'; use one of these"),
+        ({"terms": ["coulom"]}, "a term must be .*; got 'coulom'; use one of these"),
+        ({"lag": "Auto"}, "lag must be 'auto', seconds, or a time such as '2 ms'; got 'Auto'; units are .*"),
+        ({"step": 0}, "step must be at least 1; got 0; pass 1 or more"),
+    ],
+)
+def test_what_all_records_have_in_common_is_wrong_for_none_of_them(call: dict[str, Any], message: str) -> None:
+    """Errors ended with "(record 0 of 3)"."""
+    angles, torques = of_different_lengths()
+    with pytest.raises(ValueError, match=f"^{message}$"):
+        tvident.identify(angles, torques, **{"sample_rate": 1000, **call})
+
+
+def test_weights_and_masks_of_some_records_leave_the_others_as_they_are() -> None:
+    """They ended in a message of NumPy: "inhomogeneous shape"."""
+    angles, torques = of_different_lengths()
+    weights = np.where(np.arange(3000) % 2, 1.0, 2.0)
+    found = tvident.identify(angles, torques, sample_rate=1000, weights=[None, weights, None])
+    ones = [np.ones(len(one)) for one in angles]
+    whole = tvident.identify(angles, torques, sample_rate=1000, weights=[ones[0], weights, ones[2]])
+    assert np.array_equal(found[1].stiffness, whole[1].stiffness)
+    alike = tvident.identify([angles[0]] * 2, [torques[0]] * 2, sample_rate=1000, mask=[None, np.arange(2000) > 500])
+    assert np.array_equal(alike[0].stiffness, tvident.identify(angles[0], torques[0], sample_rate=1000).stiffness)
+    with pytest.raises((TypeError, ValueError), match=r"\(record 1 of 2\)"):
+        tvident.identify([angles[0], None], [torques[0]] * 2, sample_rate=1000)  # type: ignore[list-item]
+
+
+def test_a_record_that_says_nothing_of_what_is_shared_is_named() -> None:
+    angles, torques = of_different_lengths()
+    angles[1] = np.full(3000, np.nan)
+    found = tvident.identify(angles, torques, sample_rate=1000, share="inertia")
+    assert "record 1 says nothing of inertia, which is of the others alone" in found.advice[0]
+    assert found.advice[0] in found.summary()
+    assert not tvident.identify(angles[::2], torques[::2], sample_rate=1000, share="inertia").advice
+
+
+def test_records_of_a_list_are_one_table() -> None:
+    angles, torques = of_different_lengths()
+    found = tvident.identify(angles, torques, sample_rate=1000)
+    frame = found.to_pandas()
+    assert list(frame.index.names) == ["record", "time"]
+    assert np.array_equal(frame.loc[1, "stiffness"].to_numpy(), found[1].stiffness)
+    assert frame.attrs["units"]["stiffness"] == "N m/rad"
+    table = found.to_polars()
+    assert table.columns[:2] == ["record", "time"]
+    assert np.array_equal(table["record"].to_numpy(), np.repeat(np.arange(3), [len(one) for one in angles]))
+    assert np.array_equal(table["stiffness"].to_numpy(), np.concatenate([one.stiffness for one in found]))
+    records: Any = found
+    with pytest.raises(
+        AttributeError, match=r"report must be asked of one record; got a list of 3; write result\[0\]\.report"
+    ):
+        records.report("x.html")
+    with pytest.raises(AttributeError, match="has no attribute 'foo'"):
+        _ = records.foo
+    assert found[3:].to_pandas().empty

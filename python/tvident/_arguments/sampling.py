@@ -72,23 +72,28 @@ def seconds(name: str, value: str) -> float:
     return duration
 
 
-def delay(name: str, value: object) -> float:
-    """Return a time that may be negative, in seconds: from a number of them, or from a text with a unit such as ``"-2 ms"``."""
+def delay(name: str, value: object, *, word: str | None = None) -> float:
+    """Return a time that may be negative, in seconds: from a number of them, or from a text with a unit such as ``"-2 ms"``.
+
+    Where a word may stand in its place, the error names it.
+    """
     if not isinstance(value, str):
         return finite_number(name, value)
     late = _time_in(value)
     if not math.isfinite(late):
         raise ValueError(
-            f"{name} must be seconds, or a time such as '2 ms'; got {shown(value)}; units are {', '.join(_SECONDS)}"
+            f"{name} must be {f'{word!r}, ' if word else ''}seconds, or a time such as '2 ms'; got {shown(value)}; "
+            f"units are {', '.join(_SECONDS)}"
         )
     return late
 
 
 def _time_in(text: str) -> float:
     """Return the seconds of a number with a unit of time; NaN where a text is none."""
-    match = re.fullmatch(r"\s*([0-9.eE+-]+)\s*([a-zµ]+)\s*", text)
+    # The Greek letter looks like the sign of a millionth.
+    match = re.fullmatch(r"\s*([+-]?)\s*([0-9.eE+-]+)\s*([a-zµ]+)\s*", text.replace("\u03bc", "µ"))
     try:
-        return float(match[1]) * _SECONDS[match[2]] if match else math.nan
+        return float(match[1] + match[2]) * _SECONDS[match[3]] if match else math.nan
     except (KeyError, ValueError):
         return math.nan
 

@@ -76,10 +76,10 @@ def identify(
     velocity: npt.ArrayLike | None = None,
     acceleration: npt.ArrayLike | None = None,
     instrument: npt.ArrayLike | None = None,
-    lag: float | str | None = None,
+    lag: float | str | Sequence[float | str] | npt.NDArray[Any] | None = None,
     quantisation: float | None = None,
-    mask: npt.ArrayLike | None = None,
-    weights: npt.ArrayLike | None = None,
+    mask: npt.ArrayLike | Sequence[npt.ArrayLike | None] | None = None,
+    weights: npt.ArrayLike | Sequence[npt.ArrayLike | None] | None = None,
     loss: LossAsked | None = None,
     period: float | None = None,
     share: str | Sequence[str] = (),
@@ -177,7 +177,7 @@ def identify(
     lag : float, str or "auto", optional
         Delay of the torque in seconds, or with a unit, as in ``"2 ms"``; it may be a fraction of a sample. ``"auto"``, in weak form: the
         lag nearest to zero at which the torque's rate explains nothing more, with its standard error in ``settings["lag_stderr"]``; zero
-        if the record does not separate a lag from damping, as with motion at a single frequency.
+        if the record does not separate a lag from damping, as with motion at a single frequency. Several records may have one each.
     quantisation : float, optional
         Step to which the angle was rounded, in rad: an encoder's count. It is a lower bound for residuals in strong form, for the noise
         in weak form. By default it is estimated from the samples, as in :func:`tvident.fit_local_polynomials`, but not

@@ -19,8 +19,11 @@ Single = Callable[..., Identification]
 _CHANNELS = ("angle", "velocity", "acceleration", "torque", "instrument", "mask", "weights", "t")
 """Arguments that have a value for every sample, and so one array a record."""
 
-_OTHERS = ("sample_rate", "delta", "inertia", "damping", "stiffness", "settings")
+_OTHERS = ("sample_rate", "delta", "lag", "inertia", "damping", "stiffness", "settings")
 """Arguments that may be given for every record."""
+
+_OF_RECORDS = frozenset({"settings", "sample_rate", "delta", "lag"})
+"""Those of which a list has one for every record, and nothing else."""
 
 _MOST_CORRELATED = 0.9999
 """Constants of one record are taken for no more correlated than this, so that rounding makes no variance negative."""
@@ -48,7 +51,7 @@ def calls_of_records(call: Mapping[str, Any], share: Sequence[str]) -> list[dict
     if share:
         count = count or _records_of_batch(motion, call[motion])
         _check_shared(share, call)
-    elif count is None or len({np.shape(one)[-1] for one in call[motion]}) == 1:
+    elif count is None or not _differ(call):
         return None
     _check_each_is_one(call)
     calls: list[dict[str, Any]] = [{} for _ in range(count)]
@@ -56,6 +59,13 @@ def calls_of_records(call: Mapping[str, Any], share: Sequence[str]) -> list[dict
         for place, one in enumerate(_each(name, value, count)):
             calls[place][name] = one
     return calls
+
+
+def _differ(call: Mapping[str, Any]) -> bool:
+    """Return whether records have different lengths, or a channel that others have not: they are no batch."""
+    lists = [call[name] for name in _CHANNELS if _records(name, call[name]) is not None]
+    has_gaps = any(one is None for each in lists for one in each)
+    return has_gaps or len({np.shape(one)[-1] for one in lists[0]}) > 1
 
 
 def identify_records(
@@ -78,6 +88,8 @@ def identify_records(
                     found.append(single(**{**call, **change(place), "progress": tell}))
                 except (ValueError, TypeError) as error:
                     if report is not None and report.error is error:
+                        raise
+                    if place == 0 and _is_of_all(str(error), calls):
                         raise
                     kind = ValueError if isinstance(error, ValueError) else TypeError
                     raise kind(f"{error} (record {place} of {len(calls)})") from error
@@ -108,11 +120,17 @@ def identify_records(
     return IdentifiedRecords(together, shared)
 
 
+def _is_of_all(error: str, calls: Sequence[Mapping[str, Any]]) -> bool:
+    """Return whether an error begins with the name of an argument that all records have in common."""
+    name = "terms" if error.startswith("a term ") else error.partition(" ")[0]
+    return name in calls[0] and all(call[name] is calls[0][name] for call in calls)
+
+
 def _records(name: str, values: Any) -> int | None:
-    """Return how many records a list holds; None where it is none, or one record of numbers."""
-    if not isinstance(values, list | tuple) or not values:
+    """Return how many records a list holds, of which some may be None; None where it is none, or one record of numbers."""
+    if not isinstance(values, list | tuple) or all(one is None for one in values):
         return None
-    if any(not _shape(f"{name}[{place}]", one) for place, one in enumerate(values)):
+    if any(one is not None and not _shape(f"{name}[{place}]", one) for place, one in enumerate(values)):
         return None
     return len(values)
 
@@ -131,6 +149,8 @@ def _check_each_is_one(call: Mapping[str, Any]) -> None:
     """Check that what a list holds of a channel is one record each."""
     for name in _CHANNELS:
         for place, one in enumerate(call[name] if _records(name, call[name]) else ()):
+            if one is None:
+                continue
             shape = _shape(f"{name}[{place}]", one)
             if len(shape) > 1 and shape[1:] != (1,):
                 raise ValueError(
@@ -171,8 +191,9 @@ def _each(name: str, value: Any, count: int) -> Sequence[Any]:
         if several is None and name == "t":
             return [value] * count
     else:
-        several = len(value) if isinstance(value, list | tuple) else None
-        if several is None or (several != count and name not in {"settings", "sample_rate", "delta"}):
+        is_list = isinstance(value, list | tuple) or (name == "lag" and np.ndim(value) == 1)
+        several = len(value) if is_list else None
+        if several is None or (several != count and name not in _OF_RECORDS):
             return [value] * count
     if several != count:
         raise ValueError(
@@ -185,12 +206,13 @@ def _merged(results: Sequence[Identification], share: Sequence[str]) -> Shared:
     """Return what all records say of what they share, each weighted by its information."""
     count = len(share)
     information, pull = np.zeros((count, count)), np.zeros(count)
-    told = []
-    for result in results:
+    told, silent = [], []
+    for place, result in enumerate(results):
         values = np.array([result.constants[name][0] for name in share])
         covariance = _covariance(result, share)
         there = np.flatnonzero(np.isfinite(values) & (np.diagonal(covariance) > 0))
         if Status(int(result.record_status)) & Status.RANK_DEFICIENT or not there.size:
+            silent.append(place)
             continue
         weight = np.zeros((count, count))
         weight[np.ix_(there, there)] = np.linalg.inv(covariance[np.ix_(there, there)])
@@ -199,12 +221,13 @@ def _merged(results: Sequence[Identification], share: Sequence[str]) -> Shared:
         told.append((np.nan_to_num(values), weight, there.size))
     names = dict.fromkeys(share, float("nan"))
     if not told or (np.diagonal(information) <= 0).any():
-        return Shared(names, np.full((count, count), np.nan), float("nan"), 0, float("inf"))
+        return Shared(names, np.full((count, count), np.nan), float("nan"), 0, float("inf"), tuple(silent))
     together: Array = np.asarray(np.linalg.inv(information), dtype=np.float64)
     merged = together @ pull
     agreement = sum(float((values - merged) @ weight @ (values - merged)) for values, weight, _ in told)
     freedom = sum(size for *_, size in told) - count
-    return Shared(dict(zip(share, merged.tolist(), strict=True)), together, agreement, freedom, _limit(freedom))
+    found = dict(zip(share, merged.tolist(), strict=True))
+    return Shared(found, together, agreement, freedom, _limit(freedom), tuple(silent))
 
 
 def _covariance(result: Identification, share: Sequence[str]) -> Array:

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from tvident import _arguments as arguments
 from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, Kind, Term, has_kind
 from tvident._identify.earlier import (
@@ -148,9 +150,9 @@ class Request:
         if value is None:
             return [self.lag if name == "lag" else getattr(self.form, name)] * records
         if len(value) != records:
+            cure = "one a record" if name == "lag" else "settings of a result with as many records"
             raise ValueError(
-                f"{name} must be one number, or one for each of the {records} records; got {len(value)}; "
-                "give settings of a result with as many records"
+                f"{name} must be one number, or one for each of the {records} records; got {len(value)}; give {cure}"
             )
         return value
 
@@ -192,15 +194,9 @@ def resolve(
             raise ValueError(
                 f"{parameter}='varying' needs the weak form; got the strong form; use tvident.WeakForm, or {parameter}='windowed'"
             )
-    lag = asked["lag"]
-    if isinstance(lag, tuple | list) and isinstance(form, WeakForm):
-        by_record["lag"] = [arguments.delay("lag", one) for one in lag]
-    elif arguments.is_word(lag, "auto") and isinstance(form, StrongForm):
-        raise ValueError(
-            "lag='auto' needs the weak form; got the strong form; use WeakForm, or give the lag that it finds, settings['lag']"
-        )
-    elif not arguments.is_word(lag, "auto"):
-        lag = arguments.delay("lag", lag)
+    lag = _lag(asked["lag"], form)
+    if isinstance(lag, list):
+        by_record["lag"] = lag
     has_form = not arguments.is_word(method, "auto")
     same_lag = earlier is not None and "lag" not in given and earlier.get("sample_rate") == sample_rate
     return Request(
@@ -224,6 +220,26 @@ def resolve(
         windows_near=of_each(earlier, "windows_near") if earlier is not None and not has_form else (),
         lag_stderr=None if earlier is None or "lag" in given else earlier.get("lag_stderr"),
     )
+
+
+def _lag(lag: Any, form: Form) -> Any:
+    """Return a lag in seconds, one a record, or "auto"."""
+    is_weak = isinstance(form, WeakForm)
+    lag = lag.tolist() if isinstance(lag, np.ndarray) else lag
+    if isinstance(lag, tuple | list) and is_weak:
+        if any(arguments.is_word(one, "auto") for one in lag):
+            raise ValueError(
+                f"lag must be 'auto' for all records of one length, or for none; got {arguments.shown(lag)}; give 'auto', or a time "
+                "a record"
+            )
+        return [arguments.delay("lag", one) for one in lag]
+    if not arguments.is_word(lag, "auto"):
+        return arguments.delay("lag", lag, word="auto" if is_weak else None)
+    if not is_weak:
+        raise ValueError(
+            "lag='auto' needs the weak form; got the strong form; use WeakForm, or give the lag that it finds, settings['lag']"
+        )
+    return lag
 
 
 def _as_far_as_measured(

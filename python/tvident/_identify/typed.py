@@ -31,10 +31,10 @@ class GivenArguments(TypedDict, total=False):
     velocity: npt.ArrayLike | None
     acceleration: npt.ArrayLike | None
     instrument: npt.ArrayLike | None
-    lag: float | str | None
+    lag: float | str | Sequence[float | str] | npt.NDArray[Any] | None
     quantisation: float | None
-    mask: npt.ArrayLike | None
-    weights: npt.ArrayLike | None
+    mask: npt.ArrayLike | Sequence[npt.ArrayLike | None] | None
+    weights: npt.ArrayLike | Sequence[npt.ArrayLike | None] | None
     loss: LossAsked | None
     period: float | None
     align: Align

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias, overload
+from typing import Any, TypeAlias, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,7 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident._results.result import Identification
 from tvident._status import Status
+from tvident._tables import TabularList
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -30,6 +31,8 @@ class Shared:
     freedom : int
     limit : float
         What `agreement` exceeds in one of a thousand cases where records agree.
+    silent : tuple of int
+        Records that say nothing of what is shared.
     """
 
     values: Mapping[str, float]
@@ -37,6 +40,7 @@ class Shared:
     agreement: float
     freedom: int
     limit: float
+    silent: tuple[int, ...] = ()
 
     @property
     def constants(self) -> dict[str, tuple[float, float]]:
@@ -130,7 +134,12 @@ def _change(result: Identification, other: Identification, name: str, deviation:
     return np.nan_to_num(moved) if deviation > 0 else np.zeros_like(moved)
 
 
-class IdentifiedRecords(Sequence[Identification]):
+def _listed(places: Sequence[int]) -> str:
+    """Return numbers in words."""
+    return ", ".join(map(str, places[:-1])) + f" and {places[-1]}"
+
+
+class IdentifiedRecords(TabularList, Sequence[Identification]):
     """What :func:`tvident.identify` found in a list of records: a sequence of :class:`Identification`, one a record.
 
     Attributes
@@ -206,11 +215,28 @@ class IdentifiedRecords(Sequence[Identification]):
         names = " and ".join(shared.values)
         if not np.isfinite(list(shared.values.values())).all():
             return (f"no record determines {names}: excite the system, or share nothing",)
+        said = []
+        if shared.silent:
+            which = (
+                f"record {shared.silent[0]} says"
+                if len(shared.silent) == 1
+                else f"records {_listed(shared.silent)} say"
+            )
+            said.append(
+                f"{which} nothing of {names}, which is of the others alone: look whether a channel is dead, or leave it out"
+            )
         if shared.is_contradicted:
             found = f"(sum of squares {shared.agreement:.3g}, where chance explains {shared.limit:.3g})"
             cure = "do not share it, or look for a record that is not of this system"
-            return (f"records differ in {names} by more than their errors explain {found}: {cure}",)
-        return ()
+            said.append(f"records differ in {names} by more than their errors explain {found}: {cure}")
+        return tuple(said)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_") or not self._records or not hasattr(self._records[0], name):
+            raise AttributeError(f"'{type(self).__name__}' object has no attribute {name!r}")
+        raise AttributeError(
+            f"{name} must be asked of one record; got a list of {len(self)}; write result[0].{name}, say"
+        )
 
     def summary(self) -> str:
         """Return what is shared, and the summary of every record.

@@ -97,7 +97,7 @@ class Tabular:
         to_polars, to_xarray : other containers.
         Identification.columns, Identification.save : arrays by name, and files.
         """
-        pandas, table = _package("pandas"), self._table()
+        pandas, table = package("pandas"), self._table()
         columns = {name: values.reshape(-1) for name, values in table.columns.items()}
         index = pandas.Index(table.time, name="time")
         if table.index is not None:
@@ -130,7 +130,7 @@ class Tabular:
         to_pandas, to_xarray : other containers.
         Identification.columns, Identification.save : arrays by name, and files.
         """
-        polars, table = _package("polars"), self._table()
+        polars, table = package("polars"), self._table()
         count, columns = table.time.size, dict[str, Any]()
         places = [place.reshape(-1) for place in np.indices(table.batch)]
         for (name, labels), place in zip(table.records(), places, strict=True):
@@ -162,7 +162,7 @@ class Tabular:
         to_pandas, to_polars : other containers.
         Identification.columns, Identification.save : arrays by name, and files.
         """
-        xarray, table = _package("xarray"), self._table()
+        xarray, table = package("xarray"), self._table()
         known = table.labels
         if known is not None and known.dims:
             dims, coordinates = known.dims, dict(known.coordinates)
@@ -190,7 +190,7 @@ def _units(table: Table) -> dict[str, str]:
     return {name: unit for name, unit in units.items() if unit}
 
 
-def _package(name: str) -> Any:
+def package(name: str) -> Any:
     try:
         return import_module(name)
     except ImportError:
