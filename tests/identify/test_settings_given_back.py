@@ -92,6 +92,28 @@ def test_what_is_no_settings_is_refused(settings: Any) -> None:
 
 
 @pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"chosen": [5]}, r"got \[5\] as 'chosen'"),
+        ({"known": None}, "got None as 'known'"),
+        ({"form": ["weak"]}, r"got \['weak'\] as 'form'"),
+        ({"windows_near": -1}, "got -1 as 'windows_near'"),
+        ({"inner": {"cubic": "x"}}, r"got \{'cubic': 'x'\} as 'inner'"),
+    ],
+)
+def test_an_entry_that_was_spoiled_is_named(changed: dict[str, Any], words: str) -> None:
+    """The whole settings were shown."""
+    with pytest.raises(TypeError, match=f"settings must be those of an earlier result; {words}; pass result.settings"):
+        tvident.identify(np.ones(500), np.ones(500), sample_rate=1000, settings=RESULT | changed)
+
+
+def test_an_entry_that_is_missing_is_named() -> None:
+    settings = {name: value for name, value in RESULT.items() if name != "exponent"}
+    with pytest.raises(TypeError, match=r"got no .exponent.; pass result\.settings as they are"):
+        tvident.identify(np.ones(500), np.ones(500), sample_rate=1000, settings=settings)
+
+
+@pytest.mark.parametrize(
     "changed",
     [
         {"window_length": -3},

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -55,6 +55,9 @@ _BESIDE_FORM = frozenset(
 """What settings of results hold beside those of their form."""
 
 
+_ALWAYS = ("kinds", "known", "terms", "lag", "quantisation", "chosen", "method")
+"""What settings of every result hold beside those of its form."""
+
 _COUNTABLE = 1 << 53
 """More samples than any record has."""
 
@@ -103,25 +106,23 @@ def form_of_result(earlier: Mapping[str, Any]) -> tuple[str, Form, dict[str, Seq
 
 def arguments_of_result(earlier: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the arguments beside the form that an earlier result's settings stand for."""
-    try:
-        if not isinstance(earlier, Mapping):
-            raise TypeError  # noqa: TRY301 - as anything that is no settings
-        kinds, known = dict(earlier["kinds"]), dict(earlier["known"])
-        terms = [(str(name), str(kind)) for name, kind in earlier["terms"]]
-        asked = {name: earlier[name] for name in ("lag", "quantisation")}
-        asked["period"] = earlier.get("period")
-        is_whole = _is_whole(earlier, kinds, known)
-    except (KeyError, TypeError, ValueError):
-        is_whole = False
-    if not is_whole and isinstance(earlier, Mapping) and "masses" in earlier:
+    spoiled = _spoiled(earlier) if isinstance(earlier, Mapping) else "form"
+    if spoiled and isinstance(earlier, Mapping) and "masses" in earlier:
         raise TypeError(
             "settings must be those of one record; got those of trials or masses that were merged; give ensemble_axis= or dof_axis= as "
             "there, or leave settings out"
         )
-    if not is_whole:
+    if spoiled and (not isinstance(earlier, Mapping) or not earlier.keys() & {"form", *_ALWAYS}):
         raise TypeError(
             f"settings must be those of an earlier result; got {arguments.shown(earlier)}; pass result.settings"
         )
+    if spoiled:
+        got = f"{arguments.shown(earlier[spoiled])} as {spoiled!r}" if spoiled in earlier else f"no {spoiled!r}"
+        raise TypeError(f"settings must be those of an earlier result; got {got}; pass result.settings as they are")
+    kinds, known = dict(earlier["kinds"]), dict(earlier["known"])
+    terms = [(str(name), str(kind)) for name, kind in earlier["terms"]]
+    asked = {name: earlier[name] for name in ("lag", "quantisation")}
+    asked["period"] = earlier.get("period")
     _check_names(earlier, kinds, known)
     for name in COEFFICIENTS:
         asked[name] = known[name] if kinds[name] == "known" else kinds[name]
@@ -173,27 +174,62 @@ def _check_names(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Ma
         )
 
 
-def _is_whole(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Mapping[str, Any]) -> bool:
-    """Return whether settings have what a result's have: files of settings may be edited, or others."""
-    form: Any = _FORMS[earlier["form"]]
-    lists = [earlier["chosen"], earlier.get("own_terms", []), earlier.get("tested") or []]
-    return (
-        all(isinstance(one, list | tuple) for one in lists)
-        and all(isinstance(name, str) for one in lists for name in one)
-        and all(isinstance(kinds[name], str) and (kinds[name] != "known" or name in known) for name in COEFFICIENTS)
-        and all(one.name in earlier for one in fields(form))
-        and isinstance(earlier["method"], str)
-        and all(isinstance(earlier.get(name), list | tuple | None) for name in ("lag_samples", "shown_noise"))
-        and all(_is_finite(one) for name in ("lag_samples", "shown_noise") for one in earlier.get(name) or ())
-        and all(one is None or isinstance(one, str) for one in of_each(earlier, "width_from"))
-        and all(one is None or _is_count(one) for one in of_each(earlier, "windows_near"))
-        and all(isinstance(one, bool | list | tuple) for one in dict(earlier.get("needed") or {}).values())
-        and all(_is_finite(one) for one in angle_zero(earlier) or ())
-        and all(
+def _spoiled(earlier: Mapping[str, Any]) -> str:
+    """Return the first entry that is missing or not as results have it, "" where all are: files of settings may be edited, or others."""
+    lists, numbers = ("own_terms", "tested"), ("lag_samples", "shown_noise")
+    name = earlier.get("form")
+    if not isinstance(name, str) or name not in _FORMS:
+        return "form"
+    form: Any = _FORMS[name]
+    missing = [name for name in (*_ALWAYS, *(one.name for one in fields(form))) if name not in earlier]
+    if missing:
+        return missing[0]
+    checks: dict[str, Callable[[], bool]] = {
+        "kinds": lambda: all(isinstance(earlier["kinds"][name], str) for name in COEFFICIENTS),
+        "known": lambda: (
+            all(earlier["kinds"][name] != "known" or name in dict(earlier["known"]) for name in COEFFICIENTS)
+            and isinstance(earlier["known"], Mapping)
+        ),
+        "terms": lambda: all(isinstance(name, str) and isinstance(kind, str) for name, kind in earlier["terms"]),
+        "method": lambda: isinstance(earlier["method"], str),
+        "chosen": lambda: _is_of(str, earlier["chosen"]),
+        **{name: lambda name=name: _is_of(str, earlier.get(name) or []) for name in lists},  # type: ignore[misc]
+        **{name: lambda name=name: all(map(_is_finite, _list(earlier.get(name)))) for name in numbers},  # type: ignore[misc]
+        "width_from": lambda: all(one is None or isinstance(one, str) for one in of_each(earlier, "width_from")),
+        "windows_near": lambda: all(one is None or _is_count(one) for one in of_each(earlier, "windows_near")),
+        "needed": lambda: _is_of(bool | list | tuple, list(dict(earlier.get("needed") or {}).values())),
+        "angle_zero": lambda: all(_is_finite(one) for one in angle_zero(earlier) or ()),
+        "inner": lambda: all(
             all(map(_is_finite, one)) if isinstance(one, list | tuple) else _is_finite(one)
             for one in dict(earlier.get("inner") or {}).values()
-        )
-    )
+        ),
+    }
+    return next((name for name, is_right in checks.items() if not _holds(is_right)), "")
+
+
+def _holds(is_right: Callable[[], bool]) -> bool:
+    """Return whether a check holds; what cannot even be looked at does not."""
+    try:
+        return is_right()
+    except (KeyError, TypeError, ValueError):
+        return False
+
+
+def _is_of(kind: Any, values: object) -> bool:
+    return isinstance(values, list | tuple) and all(isinstance(one, kind) for one in values)
+
+
+def _list(values: object) -> Sequence[Any]:
+    """Return a list, or nothing for None.
+
+    Raises
+    ------
+    TypeError
+        If it is another thing.
+    """
+    if not isinstance(values, list | tuple | None):
+        raise TypeError
+    return values or ()
 
 
 def _is_finite(number: object) -> bool:
