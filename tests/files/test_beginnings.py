@@ -45,3 +45,25 @@ def test_a_damaged_file_is_not_called_another_kind(tmp_path: Path) -> None:
     with pytest.raises(tvident.recordings.FileError) as caught:
         tvident.read_recording(tmp_path / "rig.csv")
     assert "it begins as" not in str(caught.value)
+
+
+@pytest.mark.parametrize("alphabet", ["utf-8", "utf-8-sig", "latin-1", "utf-16"])
+@pytest.mark.parametrize("ending", [".npy", ".xlsx", ".tdms"])
+def test_text_of_any_alphabet_is_text(tmp_path: Path, alphabet: str, ending: str) -> None:
+    """Only ASCII was, and a text called .tdms "holds no numbers"."""
+    place = tmp_path / f"rig{ending}"
+    place.write_bytes("Zeit [s];Winkel [°];Änderung\n0;1;2\n1;2;3\n".encode(alphabet))
+    with pytest.raises(tvident.recordings.FileError, match=r"it begins as text does: rename it to rig\.csv, say"):
+        tvident.read_recording(place)
+    place.write_text("a,b\n1,2\n3,4\n")
+    with pytest.raises(tvident.recordings.FileError, match=r"it begins as text does: rename it to rig\.csv, say"):
+        tvident.read_recording(place)
+
+
+def test_endings_in_capitals_are_those_of_results(tmp_path: Path) -> None:
+    """A result was saved as U.NPZ without what brings it back."""
+    rig = tvident.simulate_torsional_rig(duration=2.0)
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
+    for name in ("U.NPZ", "U.Parquet"):
+        result.save(tmp_path / name)
+        assert repr(tvident.load(tmp_path / name)) == repr(result)

@@ -38,7 +38,7 @@ def identify(
         identify_in_pieces(file, output, settings_output, others, options)
         return
     outputs = {RESULTS: output, PICTURE: plot, SETTINGS: settings_output}
-    table = None if output is None or Path(output).suffix in RESULT_ENDINGS else Path(output)
+    table = None if output is None or Path(output).suffix.lower() in RESULT_ENDINGS else Path(output)
     if table is not None and (beside := place_beside(table)):
         outputs["the settings beside results"] = str(beside)
     check_outputs(outputs, inputs(file, options))

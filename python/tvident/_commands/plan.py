@@ -28,7 +28,7 @@ def plan(
     check_outputs({RESULTS: output}, {RECORDING: file})
     asked = given(options)
     if file is not None:
-        if Path(file).suffix not in RESULT_ENDINGS:
+        if Path(file).suffix.lower() not in RESULT_ENDINGS:
             raise click.UsageError(
                 f"a plan goes on from a result; got '{printable(file)}'; identify a recording with tvident identify … -o result.npz, "
                 "and give that file"

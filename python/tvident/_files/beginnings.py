@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import string
 from pathlib import Path
 
@@ -35,11 +36,29 @@ _OTHER_ENDINGS = {
 
 _START = 512
 _PRINTABLE = frozenset(string.printable.encode())
+_OF_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+_LETTERS = 0.2
+"""Of the bytes of a text, at most, that are no ASCII where it is not UTF-8: umlauts, signs of degrees."""
 
 
 def ending_by(start: bytes) -> str:
     """Return the ending of files that begin so; nothing where none is known to."""
     return next((ending for magic, ending in _BEGINNINGS.items() if start.startswith(magic)), "")
+
+
+def _is_text(start: bytes) -> bool:
+    """Return whether a file begins as text of any alphabet does."""
+    if start.startswith(_OF_UTF_16):
+        return True
+    others = [byte for byte in start if byte not in _PRINTABLE]
+    if not start or any(byte < 0x80 for byte in others):  # noqa: PLR2004 - the first that is no ASCII
+        return False
+    try:
+        # The last letter may be cut.
+        codecs.getincrementaldecoder("utf-8")().decode(start)
+    except UnicodeDecodeError:
+        return len(others) <= _LETTERS * len(start)
+    return True
 
 
 def cure_of_name(path: Path, ending: str, said: str) -> str:
@@ -50,7 +69,7 @@ def cure_of_name(path: Path, ending: str, said: str) -> str:
     except OSError:
         return ""
     known = ending_by(start)
-    if not known and start and _PRINTABLE.issuperset(start):
+    if not known and _is_text(start):
         known = ".csv"
     endings = (known, *_OTHER_ENDINGS.get(known, ()))
     if not known or ending.lower() in endings or known in said:

@@ -145,5 +145,6 @@ def read(path: str | Path) -> Channels:
     for message in said:
         warnings.warn(f"{place}: {message}", FileWarning, stacklevel=2)
     if not channels:
-        raise FileError(f"{place}: holds no numbers; export the channels as columns of numbers, or as arrays")
+        cure = cure_of_name(path, ending_of(path), "")
+        raise FileError(f"{place}: holds no numbers; export the channels as columns of numbers, or as arrays{cure}")
     return channels

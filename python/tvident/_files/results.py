@@ -37,7 +37,7 @@ def write_result(path: Path, arrays: Arrays, units: Mapping[str, str], facts: st
     """
     check_folder(path)
     named = {header(name, units): values for name, values in arrays.items()}
-    if path.suffix == ".npz":
+    if path.suffix.lower() == ".npz":
         import zipfile  # noqa: PLC0415 - the library loads without
 
         with replaced(path) as file, zipfile.ZipFile(file, "w", allowZip64=True) as archive:
@@ -65,7 +65,7 @@ def read_result(path: Path) -> tuple[dict[str, npt.NDArray[Any]], str]:
         If the file is not there, damaged, or none that holds a result.
     """
     place = printable(path)
-    if path.suffix not in ENDINGS:
+    if path.suffix.lower() not in ENDINGS:
         raise FileError(
             f"{place}: a result comes back from {' or '.join(ENDINGS)}; got '{printable(path.suffix)}'; other files keep columns only, "
             "and their settings beside them: read them with tvident.read_recording"
@@ -75,7 +75,7 @@ def read_result(path: Path) -> tuple[dict[str, npt.NDArray[Any]], str]:
     if not path.is_file():
         raise FileError(f"{place}: must be a file; it is a folder, a pipe or a device; name the file")
     try:
-        named, facts = _from_npz(path) if path.suffix == ".npz" else _from_parquet(path)
+        named, facts = _from_npz(path) if path.suffix.lower() == ".npz" else _from_parquet(path)
     except (FileError, MemoryError, ImportError):
         raise
     except Exception as error:  # noqa: BLE001 - damaged archives raise many kinds

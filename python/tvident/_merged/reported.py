@@ -361,7 +361,7 @@ class Reported(MergedSimulated, Telling, Tabular):
         Identification.save : of one record.
         """
         place = arguments.path_of("path", path)
-        if place.suffix in RESULT_ENDINGS:
+        if place.suffix.lower() in RESULT_ENDINGS:
             store(place, self)
         else:
             check_beside(place)

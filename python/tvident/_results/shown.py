@@ -121,7 +121,7 @@ class Shown(Simulated, Telling, Valued):
         identify_file : writes while it computes, for recordings longer than memory.
         """
         place = arguments.path_of("path", path)
-        if place.suffix in RESULT_ENDINGS:
+        if place.suffix.lower() in RESULT_ENDINGS:
             rest = {"terms": list(self.terms), "jumps": self.jumps, "words": plain_words(self._told)}
             store(place, self._table(), self._found, rest)
         else:
