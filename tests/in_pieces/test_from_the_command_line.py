@@ -65,6 +65,17 @@ def test_a_recording_in_a_folder_is_not_replaced_either() -> None:
     assert Path("all.zarr/rig.zarr/angle").is_dir()
 
 
+def test_results_do_not_lie_in_the_recording() -> None:
+    """A folder was left there."""
+    zarr_recording()
+    before = sorted(Path("rig.zarr").rglob("*"))
+    done = run(*IDENTIFY, "rig.zarr", "-o", "rig.zarr/sub.zarr")
+    assert done.returncode == 2
+    words = "must not lie in the folder of the recording; got 'rig.zarr/sub.zarr' in 'rig.zarr'; give another place"
+    assert words in done.stderr
+    assert sorted(Path("rig.zarr").rglob("*")) == before
+
+
 def test_results_in_a_folder_are_replaced_by_those_of_another_run() -> None:
     pytest.importorskip("zarr")
     for output in ("out.zarr", "out.zarr", "out.zarr/"):  # with a slash as shells complete it

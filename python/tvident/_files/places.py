@@ -72,13 +72,18 @@ def check_apart(outputs: Mapping[str, str | Path | None], inputs: Mapping[str, s
     Raises
     ------
     ValueError
-        If two of them are one file: the message names both.
+        If two of them are one file, or one lies in the folder that the other is: the message names both.
     """
     written = {name: Path(path) for name, path in outputs.items() if path is not None}
     read = {name: Path(path) for name, path in inputs.items() if path is not None and _exists(Path(path))}
     for index, (name, path) in enumerate(written.items()):
         others = read | dict(list(written.items())[:index])
         for other_name, other in others.items():
+            if _lies_in(path, other):
+                raise ValueError(
+                    f"{name} must not lie in the folder of {other_name}; got '{printable(path)}' in '{printable(other)}'; give another "
+                    "place"
+                )
             if _are_one(path, other):
                 rule = (
                     f"{name} must not replace {other_name}"
@@ -93,6 +98,12 @@ def _exists(path: Path) -> bool:
         return path.exists()
     except OSError:  # the name of a channel may be too long for a file
         return False
+
+
+def _lies_in(path: Path, folder: Path) -> bool:
+    """Return whether a path leads into a folder that is there."""
+    inner, outer = Path(os.path.realpath(path)), Path(os.path.realpath(folder))
+    return inner != outer and inner.is_relative_to(outer) and _exists(folder) and folder.is_dir()
 
 
 def _are_one(path: Path, other: Path) -> bool:
