@@ -273,3 +273,13 @@ def test_records_of_a_list_are_one_table() -> None:
     with pytest.raises(AttributeError, match="has no attribute 'foo'"):
         _ = records.foo
     assert found[3:].to_pandas().empty
+
+
+@pytest.mark.parametrize("terms", [None, ["offset", "coulomb"]])
+def test_terms_keep_their_kinds_beside_what_is_shared(terms: Any) -> None:
+    """Where the rest was windowed, as beside a shared inertia and damping, so were the terms: errors of the stiffness grew by a third."""
+    angles, torques = of_different_lengths()
+    found = tvident.identify(angles, torques, sample_rate=1000, share=("inertia", "damping"), terms=terms)
+    for one in found:
+        assert {kind for _, kind in one.settings["terms"]} == {"constant"}
+        assert one.settings["kinds"]["stiffness"] == "windowed"

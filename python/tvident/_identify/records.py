@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._equation import COEFFICIENTS
+from tvident._equation import COEFFICIENTS, Term
+from tvident._identify.earlier import with_earlier_kinds
 from tvident._results import Identification, IdentifiedRecords, Shared, covariance_between, with_shared
 from tvident._status import Status
 
@@ -102,12 +103,15 @@ def identify_records(
         shared = _merged(alone, share)
         if not np.isfinite(shared.covariance).all():
             return IdentifiedRecords(alone, shared)
-        known = every(lambda _: shared.values)
+        # What is unknown beside constants has the kinds that it has beside them.
+        terms = [_terms_of_kinds(call["terms"], one.settings) for call, one in zip(calls, alone, strict=True)]
+        known = every(lambda place: {**shared.values, "terms": terms[place]})
         errors = {name: error for name, (_, error) in shared.constants.items()}
         moved = {
             name: every(
                 lambda place, name=name: {  # type: ignore[misc]
                     **shared.values,
+                    "terms": terms[place],
                     name: shared.values[name] + errors[name],
                     "settings": known[place].settings,
                 }
@@ -118,6 +122,13 @@ def identify_records(
         with_shared(one, shared, {name: moved[name][place] for name in share}) for place, one in enumerate(known)
     ]
     return IdentifiedRecords(together, shared)
+
+
+def _terms_of_kinds(terms: Sequence[Any] | None, settings: Mapping[str, Any]) -> Sequence[Any]:
+    """Return terms, each with the kind that a result decided upon where none was given."""
+    if terms is None and not settings.get("own_terms"):
+        return [tuple(pair) for pair in settings["terms"]]
+    return with_earlier_kinds([terms] if isinstance(terms, str | Term) else terms or (), settings)
 
 
 def _is_of_all(error: str, calls: Sequence[Mapping[str, Any]]) -> bool:
