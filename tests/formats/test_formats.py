@@ -195,6 +195,15 @@ def _structures(fields: tuple[str, ...], rows: list[tuple[Any, ...]]) -> npt.NDA
     return made
 
 
+def test_a_matlab_file_that_was_cut_within_its_units_is_refused(tmp_path: Path) -> None:
+    """Channels in deg came back as such without a unit, with a warning alone."""
+    place = tmp_path / "rig.mat"
+    tvident.simulate_torsional_rig(duration=0.2).save(place)
+    place.write_bytes(place.read_bytes()[:-1])
+    with pytest.raises(recordings.FileError, match="the units of the channels cannot be read"):
+        tvident.read_recording(place)
+
+
 def test_arrays_of_matlab_structures_are_channels_by_name(tmp_path: Path) -> None:
     """Names and units of `channels(i)` and of a scope of Simulink were lost, and with them degrees."""
     columns = examples.ANGLE[:, None], examples.TORQUE[:, None]

@@ -56,6 +56,8 @@ def test_names_of_records_stay(result: tvident.Identification) -> None:
     assert some.trial.to_numpy().tolist() == [10, 30]
     one = result[1, 2].to_xarray()
     assert (one.stiffness.dims, str(one.rig.to_numpy()), int(one.trial)) == (("time",), "b", 30)
+    for new_axis in (True, None):
+        assert result[new_axis].to_xarray().stiffness.dims == ("record_0", "record_1", "record_2", "time")
     pairs = result[[0, 1], [2, 0]].to_xarray()
     assert pairs.stiffness.dims == ("record", "time")
     frames = [pd.DataFrame(dict(zip("abc", one[0], strict=True))) for one in (ANGLE, TORQUE)]

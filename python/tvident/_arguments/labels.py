@@ -57,7 +57,8 @@ class Labels:
             return replace(self, records=_taken(self.records, parts[0]) if is_named else None)
         *batch, time = self.dims
         parts = (*parts, *[slice(None)] * (len(batch) - len(parts)))
-        lists = [part for part in parts if not isinstance(part, slice | int | np.integer)]
+        # True is an index that makes an axis, though it is an integer.
+        lists = [part for part in parts if isinstance(part, bool) or not isinstance(part, slice | int | np.integer)]
         if len(parts) > len(batch) or len(lists) > 1 or any(np.ndim(part) != 1 for part in lists):
             # Axes that indexing makes or joins have no names.
             names = ["record"] if axes == 1 else [f"record_{axis}" for axis in range(axes)]

@@ -49,6 +49,9 @@ def _read(path: str, skipped: list[str]) -> Mapping[str, Any]:
             try:
                 variables |= read_mat(path, variable_names=[name])
             except Exception as reason:  # noqa: BLE001 - likewise
+                if name.lower() in _UNITS:
+                    # Channels would be in others, and numbers a thousand times too large.
+                    raise ValueError(f"the units of the channels cannot be read: {in_words(reason)}") from None
                 skipped.append(f"{cut(name)} ({in_words(reason)})")
                 if name == names[-1]:
                     skipped.append("what may follow it, where the file was cut")
