@@ -308,3 +308,16 @@ def test_windows_of_a_duration_are_the_same_wherever_times_count_from(alignment:
     later = tvident.rolling_least_squares(A, b, "500ms", t=t + 2.0**30, alignment=alignment)
     for name in ("params", "stderr", "residuals", "status"):
         assert np.array_equal(getattr(found, name), getattr(later, name), equal_nan=True), name
+
+
+def test_regressors_in_rows_and_times_that_windows_of_rows_do_not_need_hear_the_cure() -> None:
+    """They heard "cut one of them" and "resample the record"."""
+    generator = np.random.default_rng(3)
+    regressors, b = generator.normal(size=(2, 400)), generator.normal(size=400)
+    with pytest.raises(ValueError, match=r"got 2 and 400; pass A\.T, a column for each regressor"):
+        tvident.rolling_least_squares(regressors, b, 51)
+    irregular = np.sort(generator.random(400))
+    with pytest.raises(
+        ValueError, match=r"as a duration, such as '0\.2 s', or leave out t: windows of 51 rows need none"
+    ):
+        tvident.rolling_least_squares(regressors.T, b, 51, t=irregular)

@@ -227,7 +227,8 @@ def rolling_least_squares(
     rows, count = regressors.shape
     if rhs.shape[0] != rows:
         raise ValueError(
-            f"A and b must have as many rows as each other; got {rows} and {rhs.shape[0]}; cut one of them"
+            f"A and b must have as many rows as each other; got {rows} and {rhs.shape[0]}; "
+            f"{'pass A.T, a column for each regressor' if count == rhs.shape[0] else 'cut one of them'}"
         )
     if count > MOST_REGRESSORS:
         raise ValueError(f"A must have at most {MOST_REGRESSORS} columns; got {count}; drop or combine some")

@@ -31,7 +31,15 @@ class AskedWindows:
         times = {"delta": self.delta, "sample_rate": self.sample_rate, "t": self.t}
         if all(one is None for one in times.values()):
             return None
-        return arguments.sample_period(rows, delta=self.delta, sample_rate=self.sample_rate, t=self.t)
+        try:
+            return arguments.sample_period(rows, delta=self.delta, sample_rate=self.sample_rate, t=self.t)
+        except arguments.NotUniformError as error:
+            if isinstance(self.window_length, str):
+                raise
+            rule = str(error).rpartition("; ")[0]
+            raise ValueError(
+                f"{rule}; give window_length as a duration, such as '0.2 s', or leave out t: windows of {self.window_length} rows need none"
+            ) from None
 
 
 @dataclass(frozen=True)
