@@ -183,6 +183,16 @@ def test_default_candidates_windowed_stiffness_and_words(tmp_path: Path) -> None
     assert isinstance(compared.to_pandas(), pandas.DataFrame)
 
 
+def test_gravity_is_no_candidate_of_what_slides() -> None:
+    """It was a spring: a positioning system had a stiffness of 5014 N/m beside a gravity of -5082 N."""
+    rig = tvident.simulate_torsional_rig(duration=3.0)
+    sliding = tvident.compare_models(rig.angle, rig.torque, sample_rate=1000, angle_unit="m", torque_unit="N")
+    assert {"cubic", "coulomb"} < set(sliding.results)
+    assert not any("gravity" in name for name in sliding.results)
+    channels = tvident.Channel(rig.angle, "m"), tvident.Channel(rig.torque, "N")
+    assert set(tvident.compare_models(*channels, sample_rate=1000).results) == set(sliding.results)
+
+
 def test_what_cannot_be_compared_is_refused_with_the_rule() -> None:
     angle, torque = oscillator(1, n=3000)
     with pytest.raises(ValueError, match=r"on a single record; got shape \(1, 3000\)"):

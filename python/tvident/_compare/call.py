@@ -14,6 +14,7 @@ from tvident._compare.comparison import ModelComparison
 from tvident._identify import WeakForm, identify
 from tvident._results import Identification
 from tvident._status import Status
+from tvident._units import ROTARY, axis_of
 
 _CANDIDATES: dict[str, dict[str, Any]] = {
     "undamped": {"damping": 0.0, "terms": ("offset",)},
@@ -50,7 +51,7 @@ def compare_models(
         One record, in rad and N m.
     models : mapping of str to mapping, optional
         Arguments of :func:`tvident.identify` by the model's name: ``{"spring": {"terms": ()}, "hard": {"terms": ("cubic",)}}``. By default
-        with and without damping, offset, and cubic, gravity and Coulomb terms.
+        with and without damping, offset, and cubic, gravity and Coulomb terms; without gravity where the axis slides.
     sample_rate : float
         Samples per second. Give exactly one of `sample_rate`, `delta` and `t`.
     delta : float
@@ -101,7 +102,7 @@ def compare_models(
         t = arguments.implied_times(angle)
     if angles.ndim != 1:
         raise ValueError(f"models are compared on a single record; got shape {angles.shape}; compare one at a time")
-    candidates = _CANDIDATES if models is None else models
+    candidates = _candidates(angle, torque, common) if models is None else models
     if not isinstance(candidates, Mapping) or not all(isinstance(one, Mapping) for one in candidates.values()):
         raise TypeError(
             f"models must be a mapping of names to arguments; got {arguments.shown(models)}; write "
@@ -119,6 +120,14 @@ def compare_models(
         name: identify(angle, torque, **{**time, **call, "method": method}) for name, call in calls.items()
     }
     return ModelComparison(results, int(np.isfinite(angles).sum()))
+
+
+def _candidates(angle: npt.ArrayLike, torque: npt.ArrayLike, common: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return what is compared where nothing is given: gravity turns what turns alone, and is an offset of what slides."""
+    said = {name: common[name] for name in ("angle_unit", "torque_unit") if name in common}
+    if axis_of(angle, torque, **said).system is ROTARY:
+        return _CANDIDATES
+    return {name: call for name, call in _CANDIDATES.items() if "gravity" not in call["terms"]}
 
 
 def _richest_of_the_determined(
