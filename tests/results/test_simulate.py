@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -292,3 +293,15 @@ def test_the_record_is_not_copied(rig: tvident.Recording, result: tvident.Identi
     recorded = result._recorded  # noqa: SLF001 - what is tested
     assert recorded is not None
     assert np.shares_memory(recorded.angles, rig.angle)
+
+
+def test_a_stored_result_of_some_samples_takes_the_record_that_it_was_found_in(tmp_path: Path) -> None:
+    """It wanted the samples up to the last that has a result, 3951 of 4000."""
+    rig = tvident.simulate_torsional_rig(duration=4.0)
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=1000, step=50)
+    result.save(tmp_path / "some.npz")
+    stored = tvident.load(tmp_path / "some.npz")
+    assert stored.vaf(angle=rig.angle, torque=rig.torque) == result.vaf()
+    assert stored.vaf(angle=rig.angle[:3951], torque=rig.torque[:3951]) > 99.9
+    with pytest.raises(ValueError, match=r"record.s 3951 samples .* got 3950"):
+        stored.vaf(angle=rig.angle[:3950], torque=rig.torque[:3950])

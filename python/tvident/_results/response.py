@@ -197,6 +197,11 @@ def accounted_for(recorded: Numbers, simulated: Array) -> Array:
     return np.asarray(100 * (1 - variance(recorded - simulated) / variance(recorded.astype(np.float64))))
 
 
+def samples_of(rows: int, step: int, asked: int) -> int:
+    """Return how many samples have so many results: those that are asked for, if they are as many, or the fewest."""
+    return asked if -(-asked // step) == rows else (rows - 1) * step + 1
+
+
 def every_sample(value: Array, samples: int, step: int) -> Array:
     """Return values of every ``step``-th sample at every one, linear between them."""
     if step == 1:

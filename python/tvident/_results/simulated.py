@@ -23,7 +23,7 @@ from tvident._results.held_back import (
     stretch_of,
 )
 from tvident._results.recorded import Recorded, begins_once, both_or_none, still_there
-from tvident._results.response import Model, accounted_for, every_sample
+from tvident._results.response import Model, accounted_for, every_sample, samples_of
 from tvident._results.torque import POLYNOMIALS, SHORTEST, compared
 from tvident._status import Status
 from tvident._units import LINEAR, ROTARY, factor_said, scaled
@@ -109,7 +109,7 @@ class Simulated:
         J. D. Lawson: Generalized Runge-Kutta processes for stable systems, SIAM Journal on Numerical Analysis 4 (1967), for further terms.
         """
         torques = self._channel("torque", torque)
-        model = self._model()
+        model = self._model(samples=torques.shape[-1])
         model.check(torques)
         begins_once(initial, angle)
         if angle is not None:
@@ -351,8 +351,8 @@ class Simulated:
     def _channel(self, name: str, values: npt.ArrayLike) -> npt.NDArray[np.number]:
         return in_units_of(self.units, name, values)
 
-    def _model(self, without: npt.NDArray[np.bool_] | None = None) -> Model:
-        """Return the equation of motion that was found, with nothing at samples that are left out."""
+    def _model(self, without: npt.NDArray[np.bool_] | None = None, *, samples: int = 0) -> Model:
+        """Return the equation of motion that was found, with nothing at samples that are left out; at so many where no record says it."""
         s = self.settings
         recorded = self._recorded
         own = {} if recorded is None else recorded.own
@@ -362,8 +362,8 @@ class Simulated:
                 f"terms must be there to be simulated; the function of {missing[0]!r} was not stored with the result; identify again"
             )
         values = {"inertia": self.inertia, "damping": self.damping, "stiffness": self.stiffness, **self.terms}
-        samples = None if recorded is None else recorded.angles.shape[-1]
         period, step = 1 / s["sample_rate"], s["step"]
+        count = samples_of(self.time.size, step, samples) if recorded is None else recorded.angles.shape[-1]
 
         alone = {name for name in values if name in self.constants}
         if "angle_zero" in self.constants:
@@ -376,7 +376,7 @@ class Simulated:
             if name in alone or isinstance(s["known"].get(name), int | float):
                 return value[..., :1]
             value = value if without is None else np.where(without, np.nan, value)
-            return every_sample(value, samples or (value.shape[-1] - 1) * step + 1, step)
+            return every_sample(value, count, step)
 
         length = s["window_length"]
         lag = s.get("lag_samples") or [
