@@ -280,6 +280,8 @@ def test_poles_are_the_roots_and_positions_the_places(rig: tvident.Recording, re
         assert np.hypot(points[:, 0] - root.real, points[:, 1] - root.imag).min() < 0.05
     with pytest.raises(ValueError, match="position must have a value for each of the result's 8000 samples; got shape"):
         result.plot("over", position=rig.slider_position[:-1])
+    with pytest.raises(TypeError, match="drawn over a channel; got none; give position="):
+        result.plot("over")
     with pytest.raises(ValueError, match="name must be a parameter of the result; got 'mass'"):
         result.plot("over", position=rig.slider_position, name="mass")
 

@@ -13,7 +13,16 @@ RIG = tvident.simulate_torsional_rig(duration=2.0)
 
 
 @pytest.mark.parametrize(
-    ("given", "seconds"), [("2 ms", 0.002), ("-0.5ms", -0.0005), ("0 s", 0.0), ("1e-3 s", 0.001), (["2 ms"], [0.002])]
+    ("given", "seconds"),
+    [
+        ("2 ms", 0.002),
+        ("-0.5ms", -0.0005),
+        ("0 s", 0.0),
+        ("1e-3 s", 0.001),
+        (["2 ms"], [0.002]),
+        ("- 2 ms", -0.002),
+        ("2 \u03bcs", 2e-6),
+    ],
 )
 def test_a_lag_may_have_a_unit(given: Any, seconds: Any) -> None:
     call: dict[str, Any] = {"sample_rate": 1000, "step": 100}
@@ -24,7 +33,7 @@ def test_a_lag_may_have_a_unit(given: Any, seconds: Any) -> None:
 
 @pytest.mark.parametrize("lag", ["x", "2", "2 V", "inf s", ""])
 def test_a_lag_that_is_no_time_hears_what_is(lag: str) -> None:
-    with pytest.raises(ValueError, match=r"lag must be (seconds, or a time such as '2 ms'|finite)"):
+    with pytest.raises(ValueError, match=r"lag must be ('auto', seconds, or a time such as '2 ms'|finite)"):
         tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, lag=lag)
 
 

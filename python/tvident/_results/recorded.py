@@ -98,7 +98,9 @@ def still_there(recorded: OneRecord | None, cure: str) -> OneRecord:
         If it was not kept, or its arrays hold something else by now; the cure is what to give instead.
     """
     if recorded is None:
-        raise ValueError(f"the record must be there; got a result that was stored without it; give {cure}")
+        raise ValueError(
+            f"the record must be there; got a part of a result, or one that was stored without it; give {cure}"
+        )
     if not recorded.is_unchanged:
         raise ValueError(
             f"the record must be as it was identified; its arrays hold other samples by now; give {cure}, or pass copies to identify"

@@ -180,6 +180,10 @@ class Shown(Simulated, Telling, Valued):
         from tvident import _figures  # noqa: PLC0415 - matplotlib is optional
 
         arguments.one_of("what", what, get_args(Picture))
+        if what == "over" and "position" not in options:
+            raise TypeError(
+                "a parameter must be drawn over a channel; got none; give position=, with a value for every sample"
+            )
         if what == "scan":
             return self.scan().plot(ax=ax, **options)
         draw: dict[str, Callable[..., Figure]] = {
