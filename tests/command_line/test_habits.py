@@ -275,3 +275,21 @@ def test_the_demo_says_at_once_what_is_missing(monkeypatch: pytest.MonkeyPatch) 
     assert done.returncode == 0
     assert done.stderr.startswith("Pictures need matplotlib, which is not installed: pip install 'tvident[plot]'")
     assert done.stdout.count("result.csv") == 1
+
+
+def test_a_rate_that_the_times_of_the_file_contradict_is_said(folder: Path) -> None:
+    """With half the rate the inertia was four times too large, without a word."""
+    channels = ("--angle", "angle", "--torque", "torque")
+    tvident.read_recording(folder / "rig.npz").write("rig.csv")
+    told = "Warning: time of rig.csv shows 1000 Hz, not 500, which is used"
+    for command in (("identify", *IDENTIFY[2:6]), ("compare", *channels), ("derivatives", "--channel", "angle")):
+        call = (command[0], "rig.csv", *command[1:])
+        assert told in run(*call, "--sample-rate", "500").stderr
+        assert told in run(*call, "--delta", "0.002").stderr
+        assert "Warning" not in run(*call, "--sample-rate", "1000").stderr
+        assert "Warning" not in run(*call, "--time", "time").stderr
+    # Times in ms that do not say so.
+    text = (folder / "rig.csv").read_text().splitlines()
+    rows = [f"{number},{line.partition(',')[2]}" for number, line in enumerate(text[1:])]
+    (folder / "ms.csv").write_text("\n".join([text[0].replace("time [s]", "time"), *rows]) + "\n")
+    assert "Warning" not in run("derivatives", "ms.csv", "--channel", "angle", "--sample-rate", "1000").stderr

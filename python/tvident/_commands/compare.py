@@ -27,6 +27,7 @@ from tvident._commands.equation import lag_of, parameter_of, terms_of
 from tvident._commands.given import check_time, given
 from tvident._commands.named import named
 from tvident._commands.output import PICTURE, RECORDING, RESULTS, check_outputs, give, save_figure
+from tvident._commands.rates import say_other_rate
 from tvident._commands.scales import scaled
 from tvident._commands.words import in_options
 from tvident._equation import COEFFICIENTS
@@ -73,6 +74,7 @@ def compare(
         )
         for name, one in (("angle", angle), ("torque", torque))
     ]
+    say_other_rate(channels, options, np.shape(signals[0]), file)
     times = times_of(channels, time_channel, angle, file)
     if methods:
         _methods(channels, [*signals, times], common, output, as_json=as_json)

@@ -12,6 +12,7 @@ import tvident
 from tvident._commands.channels import channel_of, channels_in, check_has_times, only_channel
 from tvident._commands.given import check_time, given, length, period_of, wanted_progress
 from tvident._commands.output import PICTURE, RECORDING, RESULTS, check_outputs, figures_on_file, give, save_figure
+from tvident._commands.rates import say_other_rate
 from tvident._status import describe
 from tvident._units import derivative_units, named_unit, times_in_seconds, unit_said
 
@@ -39,6 +40,7 @@ def derivatives(
         channel = only_channel(channels, time_channel, file)
     check_has_times("derivatives need", check_time(sample_rate, delta, time_channel), channels, file)
     samples = channel_of(channels, channel, file)
+    say_other_rate(channels, {"sample_rate": sample_rate, "delta": delta, "time_unit": None}, samples.shape, file)
     times = None if time_channel is None else times_in_seconds(channel_of(channels, time_channel, file))
     fit = tvident.fit_local_polynomials(
         samples,

@@ -16,6 +16,7 @@ from tvident._commands.equation import lag_of, parameter_of, terms_of
 from tvident._commands.given import check_time, given, period_of, wanted_progress
 from tvident._commands.method import NAMES, method_of
 from tvident._commands.output import RECORDING
+from tvident._commands.rates import say_other_rate
 from tvident._commands.scales import scaled
 from tvident._commands.settings import read_settings
 from tvident._commands.words import units_assumed
@@ -84,6 +85,7 @@ def identified(
         recorded[-1], torque_scale, channels, file, quantity="torque", unit=options.get("torque_unit")
     )
     scales = {"angle": angle_scale, "torque": torque_scale}
+    say_other_rate(channels, options, recorded[0].shape, file)
     _say_assumed({name: one for name, one in signals.items() if scales.get(name) is None}, times, options)
     result = tvident.identify(
         signals.get("angle"),
