@@ -2,8 +2,9 @@
 
 from tvident._expansion.basis import Basis, Coordinate
 from tvident._expansion.expansion import Expansion
+from tvident._expansion.families import family_from, plain_family
 from tvident._expansion.fit import Curves, Fitted, Linearised
-from tvident._expansion.rivals import Rivals
+from tvident._expansion.rivals import Rival, Rivals
 from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown, placed
 from tvident._expansion.search import (
     DERIVATIVES,
@@ -29,12 +30,15 @@ __all__ = [
     "Fitted",
     "Linearised",
     "RecordPart",
+    "Rival",
     "Rivals",
     "SizeSearch",
     "Tried",
     "along_record",
     "curve_along",
     "curves_of",
+    "family_from",
     "placed",
+    "plain_family",
     "variance_of_steps",
 ]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -159,3 +159,17 @@ def family_of(name: str, degree: int, *, is_period: bool = True) -> Family:
     if name == "fourier" and not is_period:
         return replace(FAMILIES[name], values=_open_fourier)
     return FAMILIES[name]
+
+
+def plain_family(family: Family) -> dict[str, Any] | None:
+    """Return what a family is called, as JSON has it; None for functions of the user's own."""
+    if isinstance(family.values, partial) and family.values.func is spline_values:
+        return {"name": "bspline", "degree": int(family.values.args[0])}
+    if family.values is _open_fourier:
+        return {"name": "fourier", "is_period": False}
+    return next(({"name": name} for name, one in FAMILIES.items() if one is family), None)
+
+
+def family_from(plain: Mapping[str, Any]) -> Family:
+    """Return a family from JSON."""
+    return family_of(plain["name"], plain.get("degree", 0), is_period=plain.get("is_period", True))

@@ -73,8 +73,9 @@ def load(path: str | Path) -> Any:
     except FileError:
         raise
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        cure = "read it with tvident.read_recording if identify_file wrote it, or save it again"
         raise FileError(
-            f"{place}: must hold a result as result.save writes it; it lacks {printable(error, 60)}; save it again"
+            f"{place}: must hold a result as result.save writes it; it lacks {printable(error, 60)}; {cure}"
         ) from None
     raise FileError(f"{place}: holds a result of another version; identify again with the version at hand")
 

@@ -16,6 +16,7 @@ from tvident._equation import COEFFICIENTS
 from tvident._files import FileError, write_result
 from tvident._results.estimates import Estimates
 from tvident._results.scan import Scan
+from tvident._results.stored_curves import curves_from, plain_curves
 from tvident._results.words import Words
 from tvident._status import Status
 
@@ -60,6 +61,7 @@ def store(path: Path, table: Table, found: Estimates, rest: Mapping[str, Any]) -
         "scans": [plain_scan(scan) for scan in found.scans],
         "labels": labels,
         "units": dict(found.units),
+        "expansions": plain_curves(found.expansions),
         **rest,
     }
     write_result(path, {**arrays, **more}, found.units, json.dumps(facts))
@@ -103,6 +105,7 @@ def _estimates(arrays: Arrays, facts: Mapping[str, Any]) -> Estimates:
         kinds={name: np.asarray(kind) for name, kind in facts["kinds"].items()},
         in_common={name: number(part) for name, part in facts.get("in_common", {}).items()},
         units=facts["units"],
+        expansions=curves_from(facts.get("expansions", {})),
     )
 
 
