@@ -114,6 +114,16 @@ def test_a_refusal_says_what_to_do_without(channels: Any, option: dict[str, Any]
         identify(angle, torque, **OPTIONS, **option)
 
 
+def test_a_list_of_recordings_of_masses_hears_how_they_go_together() -> None:
+    """It heard "give all rows the same length"."""
+    generator = np.random.default_rng(0)
+    angles, torques = ([generator.normal(size=(2, n)) for n in (3000, 2000)] for _ in range(2))
+    with pytest.raises(
+        ValueError, match="got 2 of several masses without ensemble_axis=; give ensemble_axis=0 and dof_axis=1"
+    ):
+        tvident.identify(angles, torques, sample_rate=1000, dof_axis=0)
+
+
 def test_trials_of_masses_know_more_than_one() -> None:
     several = [chain([changing, constant(18.0)], 1500, seed=seed, base=True) for seed in range(4)]
     angle, torque = (np.stack([getattr(one, name) for one in several]) for name in ("angle", "torque"))

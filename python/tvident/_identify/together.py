@@ -345,6 +345,15 @@ def _check(angle: Any, options: Options) -> None:
         raise ValueError(
             f"structure= must come with dof_axis=, the axis of the masses; got {options.structure!r} alone; add dof_axis=0"
         )
+    if (
+        options.ensemble_axis is None
+        and isinstance(angle, list | tuple)
+        and any(getattr(one, "ndim", 0) > 1 for one in angle)
+    ):
+        raise ValueError(
+            f"a list beside dof_axis= must be of trials; got {len(angle)} of several masses without ensemble_axis=; give ensemble_axis=0 "
+            "and dof_axis=1, or identify one after the other"
+        )
     if options.phase is not None and options.dof_axis is not None:
         raise ValueError(
             "phase= aligns trials of one mass; got dof_axis=, beside which it is not supported yet; cut trials to the same length, and "
