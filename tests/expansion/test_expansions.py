@@ -432,3 +432,10 @@ def test_a_jump_near_the_end_is_said(last: float, seed: int) -> None:
 def test_what_functions_of_time_follow_has_no_flag(pattern: Any, seed: int) -> None:
     rig = tvident.simulate_torsional_rig(duration=8.0, seed=seed, pattern=pattern)
     assert not identify(rig, stiffness=Expansion("bspline")).record_status
+
+
+def test_functions_without_equations_are_said(short: tvident.Recording) -> None:
+    """Nothing was known, and nothing was to be done."""
+    result = identify(short, stiffness=Expansion("bspline", 6), mask=np.arange(6000) > 3000)
+    assert Status.RANK_DEFICIENT in Status(int(result.record_status))
+    assert "the equations do not determine all functions of stiffness, so nothing is known" in result.advice[0]

@@ -113,6 +113,7 @@ def words_of_expansions(
     changing: Sequence[str],
     *,
     doubted: bool = False,
+    determined: bool = True,
 ) -> Words:
     """Return how sizes were chosen, whether windows agree, and what to do where they do not.
 
@@ -128,8 +129,16 @@ def words_of_expansions(
     doubted : bool
         Whether windows in the place of functions of time find that parts of the record, or widths of the test function, contradict each
         other.
+    determined : bool
+        Whether the equations determine all factors.
     """
-    reasons, advice = [], []
+    reasons, advice = [], list[str]()
+    if not determined:
+        names = listed([one.name for one in found])
+        advice.append(
+            f"the equations do not determine all functions of {names}, so nothing is known: somewhere on their range no equation is "
+            "left, or they follow the motion; take fewer, or use samples from the whole range"
+        )
     for one in found:
         reasons.append(_size(one, observations))
         advice += _at_end(one)

@@ -91,7 +91,12 @@ class ExpandedTask:
             if arguments.is_word(self._request.parameters.get(name), "auto") and kind not in {"constant", "known"}
         ]
         words = words_of_expansions(
-            told, outcome.fitted.observations, outcome.ratio, changing, doubted=bool(outcome.doubts_of_windows)
+            told,
+            outcome.fitted.observations,
+            outcome.ratio,
+            changing,
+            doubted=bool(outcome.doubts_of_windows),
+            determined=bool(np.isfinite(outcome.fitted.condition)),
         )
         if data.labels is not None:
             found = replace(found, labels=data.labels.at(slice(None, None, data.step)))
