@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -228,3 +229,14 @@ def test_times_are_believed_rather_than_what_stands_above_them(tmp_path: Path) -
     path.write_text("Sampling rate: 500 Hz\ntime [s];angle [rad]\n0;1\n0.004;2\n0.008;1\n")
     assert tvident.read_recording(path).sample_rate == pytest.approx(250.0)
     assert "no channel holds times" not in CliRunner().invoke(main, ["info", str(path)]).stdout
+
+
+def test_ends_of_a_part_and_rates_are_numbers() -> None:
+    """Texts ended in a message of NumPy, and a rate of 0 was 0 Hz."""
+    recording = tvident.FileRecording({"time [s]": np.arange(100) / 100, "angle [rad]": np.zeros(100)})
+    ends: Any = ("0.1 s", "0.2 s")
+    with pytest.raises(TypeError, match=r"t0 must be a number; got '0\.1 s'; pass a float"):
+        recording.select(*ends)
+    assert recording.select(0.5, np.inf)["angle"].size == 50
+    with pytest.raises(ValueError, match="sample_rate must be positive and finite; got 0"):
+        tvident.FileRecording({"angle": np.zeros(10)}, sample_rate=0)

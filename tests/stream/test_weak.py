@@ -218,3 +218,14 @@ def test_a_block_in_a_gap_leaves_the_question_to_the_next(monkeypatch: pytest.Mo
         stream = pickle.loads(pickle.dumps(stream))  # noqa: S301 - our own
     # Every fifth, until one has an answer.
     assert asked == [0, 5, 10, 11, 16]
+
+
+def test_settings_of_a_batch_hear_that_a_stream_is_of_one_record() -> None:
+    """They ended in a message of Python: "not 'list'"."""
+    rig = tvident.simulate_torsional_rig(duration=4.0)
+    batch = tvident.identify(np.stack([rig.angle] * 2), np.stack([rig.torque] * 2), sample_rate=1000)
+    with pytest.raises(
+        ValueError, match=r"those of one record; got window_length \[.*\] of a batch; .* result\[0\]\.settings"
+    ):
+        tvident.IdentificationStream(sample_rate=1000, settings=batch.settings)
+    assert tvident.IdentificationStream(sample_rate=1000, settings=batch[0].settings).delay > 0

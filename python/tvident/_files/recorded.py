@@ -127,7 +127,7 @@ class FileRecording(Mapping[str, Channel]):
         self.units = {name: values.unit for name, values in self._channels.items()}
         self._full: Channels = full
         self._names = dict(zip(full, self._channels, strict=True))
-        self._rate = sample_rate
+        self._rate = None if sample_rate is None else arguments.positive_number("sample_rate", sample_rate)
         self._source = source
 
     def __getitem__(self, name: str) -> Channel:
@@ -238,6 +238,7 @@ class FileRecording(Mapping[str, Channel]):
         write : writes the part to a file.
         """
         sizes = [values.size for values in self._channels.values() if values.ndim]
+        t0, t1 = arguments.real_number("t0", t0), arguments.real_number("t1", t1)
         time = self.time
         if time is None:
             time = np.arange(max(sizes, default=0)) / self.sample_rate

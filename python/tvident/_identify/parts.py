@@ -92,6 +92,8 @@ def requested(
     ------
     TypeError
         If a parameter is known at every sample, or a term is a function: nothing of a long record is as long as it.
+    ValueError
+        If settings are of a batch.
     """
     for name in COEFFICIENTS:
         value = given.get(name)
@@ -108,7 +110,14 @@ def requested(
             raise TypeError(
                 f"terms of a long record must be built-in; got {own.name!r}; identify parts of it in memory"
             )
-    return resolve(method, given, settings, sample_rate)
+    request = resolve(method, given, settings, sample_rate)
+    several = next((name for name, each in request.by_record.items() if name != "lag" or len(each) > 1), None)
+    if several is not None:
+        got = arguments.shown(list(request.by_record[several]))
+        raise ValueError(
+            f"settings must be those of one record; got {several} {got} of a batch; give those of one of its records: result[0].settings"
+        )
+    return request
 
 
 _CALL = signature(identify)
