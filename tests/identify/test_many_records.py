@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -273,6 +274,26 @@ def test_records_of_a_list_are_one_table() -> None:
     with pytest.raises(AttributeError, match="has no attribute 'foo'"):
         _ = records.foo
     assert found[3:].to_pandas().empty
+
+
+@pytest.mark.parametrize("share", [(), ("inertia", "damping")])
+def test_a_list_comes_back_from_one_file(share: tuple[str, ...], tmp_path: Path) -> None:
+    angles, torques = of_different_lengths()
+    angles[2] = np.full(len(angles[2]), np.nan)
+    found = tvident.identify(angles, torques, sample_rate=1000, share=share)
+    found.save(tmp_path / "records.npz")
+    stored = tvident.load(tmp_path / "records.npz")
+    assert isinstance(stored, IdentifiedRecords)
+    assert (repr(stored), stored.constants, stored.advice) == (repr(found), found.constants, found.advice)
+    assert stored.record_status == found.record_status
+    for one, other in zip(stored, found, strict=True):
+        assert np.array_equal(one.stiffness, other.stiffness, equal_nan=True)
+        assert np.array_equal(one.stderr["inertia"], other.stderr["inertia"], equal_nan=True)
+        assert (one.settings, one.units) == (other.settings, other.units)
+    with pytest.raises(
+        ValueError, match=r"a file that ends in \.npz; got 'records\.csv'; rename it, or save one of them"
+    ):
+        found.save(tmp_path / "records.csv")
 
 
 @pytest.mark.parametrize("terms", [None, ["offset", "coulomb"]])

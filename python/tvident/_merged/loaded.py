@@ -17,7 +17,7 @@ from tvident._merged.merging import Identifiable, Merging
 from tvident._merged.result import MergedIdentification
 from tvident._merged.sampling import Sampling
 from tvident._merged.stored import FORMAT, KIND, OWN, entries_of
-from tvident._results import from_file, scan_from, words_from
+from tvident._results import KIND_OF_LISTS, from_file, list_from_file, scan_from, words_from
 from tvident._status import Status
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -33,7 +33,7 @@ def load(path: str | Path) -> Any:
 
     Returns
     -------
-    Identification or MergedIdentification
+    Identification, IdentifiedRecords or MergedIdentification
         What was saved; types say Any, since only the file knows. Arrays of shape (\*, n) as they were saved. Without the recording:
         :meth:`Identification.simulate` needs ``initial=`` or ``angle=``, :meth:`Identification.vaf` both channels.
 
@@ -46,7 +46,7 @@ def load(path: str | Path) -> Any:
 
     See Also
     --------
-    Identification.save, MergedIdentification.save : write it.
+    Identification.save, IdentifiedRecords.save, MergedIdentification.save : write it.
     recordings.read : reads the columns of any file.
 
     References
@@ -66,6 +66,8 @@ def load(path: str | Path) -> Any:
     place = printable(path)
     try:
         facts = json.loads(text)
+        if facts.get("kind") == KIND_OF_LISTS:
+            return list_from_file(place, arrays, facts)
         if facts.get("kind") != KIND:
             return from_file(place, arrays, facts)
         if facts["format"] == FORMAT:

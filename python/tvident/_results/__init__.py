@@ -4,7 +4,7 @@ from tvident._results.curve import ExpandedParameter, of_powers
 from tvident._results.estimates import Estimates
 from tvident._results.explained import explained_steps
 from tvident._results.held_back import parts_of, where_held_back
-from tvident._results.loaded import from_file
+from tvident._results.loaded import from_file, list_from_file
 from tvident._results.measured import Measured, known_name, number_of
 from tvident._results.medians import median_of
 from tvident._results.parts import chosen, of_records, samples_between, settings_of
@@ -16,6 +16,7 @@ from tvident._results.scan import Scan, scan_of
 from tvident._results.short import part_trusted, samples_and_seconds
 from tvident._results.simulated import POOR, in_units_of, predicted_ahead, predicted_at_samples
 from tvident._results.stored import plain_scan, plain_words, scan_from, words_from
+from tvident._results.stored_lists import KIND_OF_LISTS
 from tvident._results.summary import COLUMNS, row_of, sentences_of
 from tvident._results.told import Telling
 from tvident._results.torque import correlated_with, kernels_of, touched_by
@@ -37,6 +38,7 @@ __all__ = [
     "CHANGING",
     "COLUMNS",
     "FED_BACK",
+    "KIND_OF_LISTS",
     "POOR",
     "TRIED",
     "UNTOLD_LAG",
@@ -64,6 +66,7 @@ __all__ = [
     "kernels_of",
     "known_name",
     "known_to",
+    "list_from_file",
     "mark_of",
     "median_of",
     "negative",

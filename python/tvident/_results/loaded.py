@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
+from tvident._results.records import IdentifiedRecords, Shared
 from tvident._results.result import Identification
 from tvident._results.stored import restored, words_from
 
@@ -31,3 +33,17 @@ def from_file(place: str, arrays: dict[str, npt.NDArray[Any]], facts: Mapping[st
         words=words_from(facts["words"]),
         settings=facts["settings"],
     )
+
+
+def list_from_file(place: str, arrays: Mapping[str, npt.NDArray[Any]], facts: Mapping[str, Any]) -> IdentifiedRecords:
+    """Return the list of results that a file holds, with what they share."""
+    found = []
+    for number, one in enumerate(facts["records"]):
+        prefix = f"{number}/"
+        own = {name.removeprefix(prefix): values for name, values in arrays.items() if name.startswith(prefix)}
+        found.append(from_file(place, own, one))
+    told = facts["shared"]
+    if told is None:
+        return IdentifiedRecords(found)
+    shared = {**told, "covariance": np.array(told["covariance"]), "silent": tuple(told["silent"])}
+    return IdentifiedRecords(found, Shared(**shared))

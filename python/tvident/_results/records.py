@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, TypeAlias, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident._files import printable
 from tvident._results.result import Identification
+from tvident._results.stored_lists import store_list
 from tvident._status import Status
 from tvident._tables import TabularList
 
@@ -230,6 +233,36 @@ class IdentifiedRecords(TabularList, Sequence[Identification]):
             cure = "do not share it, or look for a record that is not of this system"
             said.append(f"records differ in {names} by more than their errors explain {found}: {cure}")
         return tuple(said)
+
+    def save(self, path: str | Path) -> None:
+        """Write all results to one file, from which :func:`tvident.load` brings them back.
+
+        Parameters
+        ----------
+        path : str or Path
+            A name that ends in ``.npz``. The file appears whole or not at all.
+
+        Raises
+        ------
+        ValueError
+            If the ending is another one: records of a list have no table of one length.
+        OSError
+            If there is no such folder, or the file cannot be written.
+
+        See Also
+        --------
+        tvident.load : reads it back.
+        Identification.save : one of the records, to other files too.
+        """
+        place = arguments.path_of("path", path)
+        if place.suffix.lower() != ".npz":
+            raise ValueError(
+                f"a list of results is saved to a file that ends in .npz; got '{printable(place.name)}'; rename it, or save one of them: "
+                "result[0].save(…)"
+            )
+        shared = self._shared
+        told = None if shared is None else {**vars(shared), "covariance": shared.covariance.tolist()}
+        store_list(place, self._records, told)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or not self._records or not hasattr(self._records[0], name):

@@ -122,12 +122,15 @@ class Shown(Simulated, Telling, Valued):
         """
         place = arguments.path_of("path", path)
         if place.suffix.lower() in RESULT_ENDINGS:
-            rest = {"terms": list(self.terms), "jumps": self.jumps, "words": plain_words(self._told)}
-            store(place, self._table(), self._found, rest)
+            store(place, self._table(), self._found, self._rest())
         else:
             check_beside(place)
             write_table(place, self.columns(), self.units)
             write_settings(place, self.settings)
+
+    def _rest(self) -> dict[str, Any]:
+        """Return what files hold beside numbers."""
+        return {"terms": list(self.terms), "jumps": self.jumps, "words": plain_words(self._told)}
 
     def summary(self) -> str:
         """Return a table of the parameters, and in words what was chosen and what to do.

@@ -30,11 +30,16 @@ Arrays = dict[str, npt.NDArray[Any]]
 
 
 def store(path: Path, table: Table, found: Estimates, rest: Mapping[str, Any]) -> None:
-    """Write a result: its columns, what else has one value a sample, and the rest as JSON.
+    """Write a result: its columns, what else has one value a sample, and the rest as JSON."""
+    arrays, facts = plain_result(table, found, rest)
+    write_result(path, arrays, found.units, json.dumps(facts))
+
+
+def plain_result(table: Table, found: Estimates, rest: Mapping[str, Any]) -> tuple[Arrays, dict[str, Any]]:
+    """Return what files hold of a result: arrays by name, and the rest as JSON has it.
 
     Parameters
     ----------
-    path : Path
     table : Table
         The columns that everybody reads.
     found : Estimates
@@ -64,7 +69,7 @@ def store(path: Path, table: Table, found: Estimates, rest: Mapping[str, Any]) -
         "expansions": plain_curves(found.expansions),
         **rest,
     }
-    write_result(path, {**arrays, **more}, found.units, json.dumps(facts))
+    return {**arrays, **more}, facts
 
 
 def restored(place: str, arrays: Arrays, facts: Mapping[str, Any]) -> Estimates:
