@@ -196,3 +196,23 @@ def test_noise_that_was_low_passed_is_not_taken_for_motion(cutoff: float, patter
     assert result.settings["window_length"] > LEAST_WIDTH
     assert not result.record_status & Status.WINDOW_LIMIT
     assert result.record_status & Status.LAG_SUSPECTED
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("seed", [11, *long(12, 13, 14)])
+@pytest.mark.parametrize("pattern", ["slider", "constant"])
+@pytest.mark.parametrize(("cutoff", "order"), [(50.0, 1), (100.0, 2)])
+def test_the_noise_of_channels_that_passed_one_filter_is_read_above_the_motion(
+    cutoff: float, order: int, pattern: Pattern, seed: int
+) -> None:
+    """The quietest band said that there was next to none: the residuals exceeded it in nine of ten records."""
+    recording = tvident.simulate_torsional_rig(20.0, seed=seed, pattern=pattern, angle_noise=1e-3)
+    angle, torque = (
+        lfilter(*butter(order, cutoff, fs=RATE), channel) for channel in (recording.angle, recording.torque)
+    )
+    result = tvident.identify(angle, torque, sample_rate=RATE)
+    assert not result.record_status
+    inside = slice(500, -500)
+    for name in ("inertia", "damping", "stiffness"):
+        score = ((getattr(result, name) - getattr(recording, name)) / result.stderr[name])[inside]
+        assert np.sqrt(np.mean(score**2)) < CLOSE, name

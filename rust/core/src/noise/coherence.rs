@@ -23,6 +23,9 @@ const SHORT_SEGMENT: usize = 128;
 const MOST: usize = 256;
 const FEWEST: usize = 16;
 
+/// The power of a sine as which segments fade in and out.
+const FADE: i32 = 2;
+
 /// Above the motion the angle's power is at most so many times that of its noise, in at least so many frequencies.
 const FLAT: f64 = 1.15;
 const FREQUENCIES: usize = 32;
@@ -63,7 +66,7 @@ pub fn noise_coherence(
     variance: f64,
     (inertia, lag): (f64, f64),
 ) -> Option<f64> {
-    let spectra = spectra(angle, torque)?;
+    let spectra = spectra(angle, torque, FADE)?;
     let count = spectra.segments as f64;
     // From the highest frequency down, as long as their mean is that of noise.
     let highest = spectra.length / 2;
@@ -98,14 +101,14 @@ pub fn noise_coherence(
     Some(((coherence.sum::<f64>() / frequencies - bias) / (1.0 - bias)).max(0.0))
 }
 
-/// Spectra of two channels, or `None` if there are too few segments in which every sample of both is usable.
-pub(crate) fn spectra(angle: &dyn Samples, torque: &dyn Samples) -> Option<Spectra> {
+/// Spectra of two channels, or `None` if there are too few segments in which every sample of both is usable. These fade in and out as some power of a sine.
+pub(crate) fn spectra(angle: &dyn Samples, torque: &dyn Samples, power: i32) -> Option<Spectra> {
     let samples = angle.len().min(torque.len());
     let is_long = 2 * samples >= (FEWEST + 1) * SEGMENT;
     let length = if is_long { SEGMENT } else { SHORT_SEGMENT };
     let last = samples.checked_sub(length)?;
     let every = (length / 2).max(last / MOST);
-    let fade: Vec<f64> = (0..length).map(|k| (PI * (k as f64 + 0.5) / length as f64).sin().powi(2)).collect();
+    let fade: Vec<f64> = (0..length).map(|k| (PI * (k as f64 + 0.5) / length as f64).sin().powi(power)).collect();
     let energy: f64 = fade.iter().map(|value| value * value).sum();
     let transform = Transform::new(length);
     let size = length / 2 + 1;

@@ -97,8 +97,7 @@ impl Session<'_, '_, '_> {
     /// The half-width of the narrowest test function that is tried, beside a typical cycle of the motion in samples.
     ///
     /// What the angle shows above the corner of a low-pass filter looks like motion, since its noise cannot be read there, and makes narrow test
-    /// functions seem best. Where it alone was low-passed their band ends with that in which both channels show the same motion, but not below what
-    /// a part of a typical cycle needs.
+    /// functions seem best. Their band ends with that in which both channels show the same motion, but not below what a part of a typical cycle needs.
     fn narrowest(&self, typical: usize) -> usize {
         let Some(until) = self.shared_until else { return LEAST_HALF_WIDTH };
         let half = TestFunction::half_width_of(until, self.options.exponent.unwrap_or(EXPONENT));

@@ -31,8 +31,8 @@ pub(crate) struct Session<'a, 'b, 'c> {
     pub(crate) channel_noise: [f64; 2],
     /// Whether the noise of the angle is that of its rounding: in slow motion it lasts, so that parts of the record scatter more than white noise says.
     pub(crate) is_rounding: bool,
-    /// Cycles per sample up to which both channels show the same motion, where the angle alone was low-passed and the width of the test function is to be
-    /// chosen.
+    /// Cycles per sample up to which both channels show the same motion, where the angle was low-passed, alone or as the torque was, and the width of the
+    /// test function is to be chosen.
     pub(crate) shared_until: Option<f64>,
     /// Estimates by the width of the test function.
     pub(crate) scan: Scan,
