@@ -170,3 +170,17 @@ def test_buffers_at_rest_hold_samples_that_are_alike() -> None:
     # A clock that stands holds nothing back for ever.
     clock = LiveClock(1e-3)
     assert sum(len(clock.rows((1.0, 0.0, 0.0))) for _ in range(1000)) > 980
+
+
+@pytest.mark.parametrize("rate", [1100.0, 1250.0, 1499.0])
+@pytest.mark.parametrize("is_at_rest_first", [False, True])
+def test_samples_at_rest_whose_stamps_have_few_digits_are_kept(rate: float, *, is_at_rest_first: bool) -> None:
+    """Two samples within a millisecond have one stamp, and the next one comes 1.1 to 1.5 periods later."""
+    count = 4000
+    stamps = np.round(np.arange(count) / rate, 3)
+    moves = np.arange(count) >= count // 2 if is_at_rest_first else np.arange(count) < count // 2
+    values = np.where(moves, np.sin(np.arange(count)), 0.0)
+    clock = LiveClock(1 / rate)
+    rows = [row for stamp, value in zip(stamps, values, strict=True) for row in clock.rows((stamp, value, 0.0))]
+    assert np.array_equal([row[1] for row in [*rows, *clock.rest()]], values)
+    assert (clock.twice, clock.lost, clock.repeated) == (0, 0, 0)

@@ -17,6 +17,9 @@ _HALF = 0.5
 _MOVES = 0.25
 """Periods from stamp to stamp, at least, where they say how samples follow each other: those of one buffer are alike."""
 
+_COARSE = 1.005
+"""Periods from stamp to stamp, at least, where their last digit is longer than a period."""
+
 _FOLLOW = 0.05
 """Part of a stamp's lateness by which the next one is expected later: the clock is followed over some 20 samples."""
 
@@ -74,7 +77,7 @@ class LiveClock:
     A stamp that is late alone, since a driver held it back, is followed by ones that are not; after a loss all are late, and after
     samples that came twice all are early. So a stamp that is off waits for the next 16, and whole periods that all of them are late are
     lost samples. With a counter nothing has to wait. Where samples came twice or the clock was set, one NaN keeps windows apart; a
-    sample that comes twice with its stamp is left out, unless the next stamp says that both are of one buffer.
+    sample that comes twice with its stamp is left out, unless stamps say that both are of one buffer, or have too few digits to say it.
 
     Parameters
     ----------
@@ -103,6 +106,8 @@ class LiveClock:
         self.rate = Rate()
         self._newest = math.nan
         self._latest: Row = (math.nan,) * 3
+        self._shortest = math.inf
+        """Seconds from one stamp to another."""
         self._alike: list[Row] = []
         """Samples that are like the one before them, stamp and values, until the next stamp says what they are."""
         self.lost = self.repeated = self.jumps = self.back = self.twice = 0
@@ -114,8 +119,13 @@ class LiveClock:
         if row[0] == self._latest[0] and not _differ(row, self._latest):
             self._alike.append(row)
             return self._of_alike(came_twice=False) if len(self._alike) > _WAIT else []
-        step, self._latest = (row[0] - self._latest[0]) / self._seconds(), row
-        return [*self._of_alike(came_twice=_MOVES < step < 1 + _HALF), *self._next_rows(row)]
+        seconds, self._latest = row[0] - self._latest[0], row
+        step = seconds / self._seconds()
+        if step > _MOVES:
+            self._shortest = min(self._shortest, seconds)
+        # Stamps with few digits are alike where two samples lie within one digit: none ever comes after a single period.
+        has_few_digits = self._shortest > _COARSE * self._seconds()
+        return [*self._of_alike(came_twice=_MOVES < step < 1 + _HALF and not has_few_digits), *self._next_rows(row)]
 
     def _of_alike(self, *, came_twice: bool) -> list[Row]:
         """Return what is in order of samples that are alike: nothing where they came twice."""
