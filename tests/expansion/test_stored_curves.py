@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +49,10 @@ def test_curves_come_back_to_the_last_bit(
     for name in ("name", "family", "size", "limits", "unit", "unit_of"):
         assert getattr(stored, name) == getattr(curve, name)
     assert all(np.array_equal(stored.sizes[name], values) for name, values in curve.sizes.items())
+    # A copy has the same functions: those of powers, Haar and Daubechies were taken for the user's own.
+    copy.deepcopy(result).save(tmp_path / f"copied.{ending}")
+    copied = tvident.load(tmp_path / f"copied.{ending}").expansions["stiffness"]
+    assert np.array_equal(copied.value, curve.value, equal_nan=True)
 
 
 def test_functions_of_the_users_own_are_said_to_be_lost(rig: tvident.Recording, tmp_path: Path) -> None:

@@ -163,11 +163,18 @@ def family_of(name: str, degree: int, *, is_period: bool = True) -> Family:
 
 def plain_family(family: Family) -> dict[str, Any] | None:
     """Return what a family is called, as JSON has it; None for functions of the user's own."""
-    if isinstance(family.values, partial) and family.values.func is spline_values:
-        return {"name": "bspline", "degree": int(family.values.args[0])}
-    if family.values is _open_fourier:
+    function, given = _function_of(family)
+    if function is spline_values:
+        return {"name": "bspline", "degree": int(given[0])}
+    if function is _open_fourier:
         return {"name": "fourier", "is_period": False}
-    return next(({"name": name} for name, one in FAMILIES.items() if one is family), None)
+    return next(({"name": name} for name, one in FAMILIES.items() if _function_of(one) == (function, given)), None)
+
+
+def _function_of(family: Family) -> tuple[Callable[..., Array], tuple[Any, ...]]:
+    """Return the function of a family and what it is given first: copies of a family, as pickle makes them, have the same."""
+    values = family.values
+    return (values.func, values.args) if isinstance(values, partial) else (values, ())
 
 
 def family_from(plain: Mapping[str, Any]) -> Family:

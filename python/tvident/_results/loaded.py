@@ -37,11 +37,11 @@ def from_file(place: str, arrays: dict[str, npt.NDArray[Any]], facts: Mapping[st
 
 def list_from_file(place: str, arrays: Mapping[str, npt.NDArray[Any]], facts: Mapping[str, Any]) -> IdentifiedRecords:
     """Return the list of results that a file holds, with what they share."""
-    found = []
-    for number, one in enumerate(facts["records"]):
-        prefix = f"{number}/"
-        own = {name.removeprefix(prefix): values for name, values in arrays.items() if name.startswith(prefix)}
-        found.append(from_file(place, own, one))
+    own: list[dict[str, npt.NDArray[Any]]] = [{} for _ in facts["records"]]
+    for name, values in arrays.items():
+        number, _, rest = name.partition("/")
+        own[int(number)][rest] = values
+    found = [from_file(place, columns, one) for columns, one in zip(own, facts["records"], strict=True)]
     told = facts["shared"]
     if told is None:
         return IdentifiedRecords(found)
