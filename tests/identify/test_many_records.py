@@ -230,6 +230,9 @@ def test_what_all_records_have_in_common_is_wrong_for_none_of_them(call: dict[st
     angles, torques = of_different_lengths()
     with pytest.raises(ValueError, match=f"^{message}$"):
         tvident.identify(angles, torques, **{"sample_rate": 1000, **call})
+    # Others are longer.
+    with pytest.raises(ValueError, match=r"lag must be shorter than the record of 2 s; .* \(record 0 of 3\)"):
+        tvident.identify(angles, torques, sample_rate=1000, lag=2.5)
 
 
 def test_weights_and_masks_of_some_records_leave_the_others_as_they_are() -> None:
@@ -242,6 +245,8 @@ def test_weights_and_masks_of_some_records_leave_the_others_as_they_are() -> Non
     assert np.array_equal(found[1].stiffness, whole[1].stiffness)
     alike = tvident.identify([angles[0]] * 2, [torques[0]] * 2, sample_rate=1000, mask=[None, np.arange(2000) > 500])
     assert np.array_equal(alike[0].stiffness, tvident.identify(angles[0], torques[0], sample_rate=1000).stiffness)
+    none = tvident.identify(angles, torques, sample_rate=1000, weights=[None] * 3, mask=[None] * 3)
+    assert np.array_equal(none[1].stiffness, tvident.identify(angles[1], torques[1], sample_rate=1000).stiffness)
     with pytest.raises((TypeError, ValueError), match=r"\(record 1 of 2\)"):
         tvident.identify([angles[0], None], [torques[0]] * 2, sample_rate=1000)  # type: ignore[list-item]
 

@@ -112,6 +112,8 @@ def test_what_would_be_ignored_is_refused() -> None:
     result = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
     with pytest.raises(TypeError, match="got result= and inertia=, band=; leave out one"):
         tvident.plan_experiment(result=result, inertia=0.01, band=(1, 2))
+    with pytest.raises(TypeError, match="got result= and angle_noise=, sample_rate=; leave out one"):
+        tvident.plan_experiment(result=result, sample_rate=500, angle_noise=0.0)
     with pytest.raises(TypeError, match="more must go with result="):
         tvident.plan_experiment(**GUESS, torque_noise=0.02, torque_rms=0.1, more=5)
     ran = run("plan", "one.npz", "--inertia", "0.01")

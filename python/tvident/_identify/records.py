@@ -132,14 +132,16 @@ def _terms_of_kinds(terms: Sequence[Any] | None, settings: Mapping[str, Any]) ->
 
 
 def _is_of_all(error: str, calls: Sequence[Mapping[str, Any]]) -> bool:
-    """Return whether an error begins with the name of an argument that all records have in common."""
+    """Return whether an error begins with the name of an argument that all records have in common, and speaks of no record."""
+    if "record" in error:
+        return False
     name = "terms" if error.startswith("a term ") else error.partition(" ")[0]
     return name in calls[0] and all(call[name] is calls[0][name] for call in calls)
 
 
 def _records(name: str, values: Any) -> int | None:
-    """Return how many records a list holds, of which some may be None; None where it is none, or one record of numbers."""
-    if not isinstance(values, list | tuple) or all(one is None for one in values):
+    """Return how many records a list holds, of which any may be None; None where it is none, or one record of numbers."""
+    if not isinstance(values, list | tuple) or not values:
         return None
     if any(one is not None and not _shape(f"{name}[{place}]", one) for place, one in enumerate(values)):
         return None

@@ -31,6 +31,9 @@ _LEAST_SHARE = 0.01
 _MORE = 60.0
 """Seconds that are recorded in addition where nothing is said."""
 
+_RATE = 1000.0
+"""Samples per second where nothing is said."""
+
 _LONGEST = 1e7
 """Seconds: a third of a year."""
 
@@ -46,12 +49,12 @@ def plan_experiment(
     stiffness: float | None = None,
     band: Sequence[float] | None = None,
     torque_noise: float | None = None,
-    angle_noise: float = 0.0,
+    angle_noise: float | None = None,
     wanted: float = 0.02,
     duration: float | None = None,
     torque_rms: float | None = None,
     resolution: float | None = None,
-    sample_rate: float = 1000.0,
+    sample_rate: float | None = None,
     angle_unit: str | None = None,
     torque_unit: str | None = None,
     result: Identification | None = None,
@@ -75,7 +78,7 @@ def plan_experiment(
     torque_noise : float
         Standard deviation of the torque's noise at each sample, in `torque_unit`.
     angle_noise : float, optional
-        The same of the angle, in `angle_unit`.
+        The same of the angle, in `angle_unit`; by default none.
     wanted : float, optional
         Relative standard error of the stiffness that is wanted.
     duration : float, optional
@@ -87,7 +90,7 @@ def plan_experiment(
         The stiffness changes, and this is the time in seconds over which it may be averaged: the length of a regression window, or the
         record over the number of functions of an :class:`Expansion`. By default it is constant.
     sample_rate : float, optional
-        Samples per second.
+        Samples per second, by default 1000.
     angle_unit, torque_unit : str, optional
         Units of `angle_noise`, `torque_noise` and `torque_rms`, by default rad and N m. Those of a length or a force (``"mm"``, ``"N"``)
         say that the axis slides. What is planned is in rad and N m, or in m and N: ``units`` says it.
@@ -139,19 +142,20 @@ def plan_experiment(
     wanted = arguments.positive_number("wanted", wanted)
     of_guess = {"duration": duration, "torque_rms": torque_rms, "resolution": resolution}
     given = {"inertia": inertia, "damping": damping, "stiffness": stiffness, "torque_noise": torque_noise}
+    others = {"band": band, "angle_noise": angle_noise, "sample_rate": sample_rate}
     _check_one_source(
-        result, more, {**given, **of_guess, "band": band, "angle_unit": angle_unit, "torque_unit": torque_unit}
+        result, more, {**given, **of_guess, **others, "angle_unit": angle_unit, "torque_unit": torque_unit}
     )
     if result is not None:
         return _longer(result, wanted, _MORE if more is None else arguments.positive_number("more", more))
     numbers = {name: _needed(name, one) for name, one in given.items()}
     _check_size(given | {"wanted": wanted, "angle_noise": angle_noise or None, "sample_rate": sample_rate})
     _check_size(of_guess)
-    rate = arguments.positive_number("sample_rate", sample_rate)
+    rate = _RATE if sample_rate is None else arguments.positive_number("sample_rate", sample_rate)
     low, high = _band(band, rate)
     axis = axis_of(None, None, angle_unit=angle_unit, torque_unit=torque_unit)
     units = UNITS if axis.system is ROTARY else LINEAR_UNITS
-    angle_error = arguments.finite_number("angle_noise", angle_noise, least=0)
+    angle_error = arguments.finite_number("angle_noise", 0.0 if angle_noise is None else angle_noise, least=0)
     noise = (angle_error * axis.angle, numbers["torque_noise"] * axis.torque)
     guess = Guess(np.array([numbers[name] for name in COEFFICIENTS]), noise)
     frequencies, share = _powers(guess, low, high)
