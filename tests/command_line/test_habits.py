@@ -293,3 +293,28 @@ def test_a_rate_that_the_times_of_the_file_contradict_is_said(folder: Path) -> N
     rows = [f"{number},{line.partition(',')[2]}" for number, line in enumerate(text[1:])]
     (folder / "ms.csv").write_text("\n".join([text[0].replace("time [s]", "time"), *rows]) + "\n")
     assert "Warning" not in run("derivatives", "ms.csv", "--channel", "angle", "--sample-rate", "1000").stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "jitter", "given", "told"),
+    [
+        ("time", 1.0, 0.2, ("--sample-rate", "500"), "shows about 1000 Hz, not 500"),
+        ("time", 1.0, 0.2, ("--sample-rate", "1000"), ""),
+        ("time [s]", 1.0, 0.0, ("--sample-rate", "1"), "shows 1000 Hz, not 1,"),
+        ("time [ms]", 1e3, 0.0, ("--delta", "2", "--time-unit", "ms"), "shows 1000 Hz, not 500"),
+        ("time [ms]", 1e3, 0.0, ("--delta", "1", "--time-unit", "ms"), ""),
+        ("time", 1e3, 0.0, ("--sample-rate", "1000"), ""),
+        ("time", 1 / 86400, 0.0, ("--sample-rate", "1000"), ""),
+    ],
+)
+def test_times_of_any_unit_and_with_jitter_are_held_against_a_rate(
+    folder: Path, name: str, factor: float, jitter: float, given: tuple[str, ...], told: str
+) -> None:
+    """Times that are not uniform said nothing, and days were another rate."""
+    rig = tvident.read_recording(folder / "rig.npz")
+    steps = np.arange(rig["angle"].size) + jitter * np.random.default_rng(0).uniform(-1, 1, rig["angle"].size)
+    times = factor * 1e-3 * steps
+    tvident.FileRecording({name: times, "angle": rig["angle"], "torque": rig["torque"]}).write("other.csv")
+    said = run("identify", "other.csv", "--angle", "angle", "--torque", "torque", *given).stderr
+    assert told in said
+    assert ("Warning" in said) == bool(told)
