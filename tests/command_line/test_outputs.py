@@ -393,6 +393,17 @@ def test_settings_that_are_none(folder: Path, content: str, message: str) -> Non
     assert "Traceback" not in done.stderr
 
 
+def test_settings_of_a_list_of_records_are_of_none_of_them(folder: Path) -> None:
+    """They ended in a traceback."""
+    rig = tvident.simulate_torsional_rig(duration=2.0)
+    parts = [(rig.angle[:count], rig.torque[:count]) for count in (1000, 1500)]
+    found = tvident.identify([one for one, _ in parts], [other for _, other in parts], sample_rate=1000)
+    found.save(folder / "list.npz")
+    ran = run(*IDENTIFY, "--settings", "list.npz", cwd=folder)
+    assert ran.returncode != 0
+    assert "list.npz: settings must be those of one result; it holds a list of 2; save one of them" in ran.stderr
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("ending", [".json", ".toml", ".csv", ".npz"])
 def test_settings_are_not_waited_for_at_a_pipe(folder: Path, ending: str) -> None:

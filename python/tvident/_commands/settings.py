@@ -24,7 +24,12 @@ def read_settings(path: str) -> dict[str, Any]:
     cure = "give a result, a file that --settings-output wrote, or options as TOML"
     ending = Path(path).suffix.lower()
     if ending in RESULT_ENDINGS:
-        found: dict[str, Any] = tvident.load(path).settings
+        result = tvident.load(path)
+        if isinstance(result, tvident.IdentifiedRecords):
+            raise recordings.FileError(
+                f"{place}: settings must be those of one result; it holds a list of {len(result)}; save one of them: result[0].save(…)"
+            )
+        found: dict[str, Any] = result.settings
         return found
     kind = Path(path).stat()
     # A pipe is not opened: that waits for who writes into it.
