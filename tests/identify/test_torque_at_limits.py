@@ -59,6 +59,20 @@ def test_samples_at_the_limit_of_a_recorder_count_as_missing(seed: int) -> None:
     np.testing.assert_array_equal(identify(angle, missing, sample_rate=RATE).inertia, found.inertia)
 
 
+@pytest.mark.parametrize("limit", [1.2, np.inf])
+def test_a_part_of_a_long_record_is_asked_first_whose_limits_they_are(limit: float) -> None:
+    """Whatever the part says, numbers are those of the whole record with or without these samples."""
+    angle, torque = (np.tile(channel, 7) for channel in drive(0, limit))
+    clipped = recorded(torque, 0, 1.2) if np.isinf(limit) else torque
+    found = identify(angle, clipped, sample_rate=RATE)
+    is_left_out = bool(found.record_status & Status.CHANNEL_SUSPECTED)
+    assert is_left_out == np.isinf(limit)
+    assert is_near(found)
+    if is_left_out:
+        missing = np.where(np.abs(clipped) < np.abs(clipped).max(), clipped, np.nan)
+        np.testing.assert_array_equal(identify(angle, missing, sample_rate=RATE).inertia, found.inertia)
+
+
 @pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("seed", range(4))

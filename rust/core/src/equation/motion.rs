@@ -2,9 +2,12 @@
 //!
 //! Unknown coefficients have a column of regressors; known terms move to the right-hand side.
 
+use std::ops::Range;
+
 use crate::equation::terms::{BuiltInTerm, TermFunction, signs};
 use crate::noise::fused::AngleNoise;
 use crate::noise::passed::PassedNoise;
+use crate::record::derived::Cut;
 use crate::record::samples::Samples;
 
 /// What is known of inertia, damping or stiffness beforehand.
@@ -58,6 +61,40 @@ impl Motion<'_> {
     #[must_use]
     pub fn unknowns(&self) -> usize {
         self.coefficients.iter().filter(|one| matches!(one, Coefficient::Unknown)).count() + self.terms.len()
+    }
+
+    /// Does something with the motion in a part of its samples.
+    pub(crate) fn within<R>(&self, part: &Range<usize>, work: impl FnOnce(&Motion<'_>) -> R) -> R {
+        let cut = |channel| Cut { channel, samples: part.clone() };
+        let (angle, torque) = (cut(self.angle), cut(self.torque));
+        let channels = self.measured.channels.map(|channel| channel.map(cut));
+        let known = self.coefficients.map(|one| match one {
+            Coefficient::Record(record) => Some(cut(record)),
+            _ => None,
+        });
+        let given = self.terms.iter().map(|term| match *term {
+            Term::Record(record) => Some(cut(record)),
+            Term::BuiltIn(_) => None,
+        });
+        let given: Vec<_> = given.collect();
+        let terms = self.terms.iter().zip(&given);
+        let [inertia, damping, stiffness] = &known;
+        let mut coefficients = self.coefficients;
+        for (coefficient, part) in coefficients.iter_mut().zip([inertia, damping, stiffness]) {
+            if let Some(part) = part {
+                *coefficient = Coefficient::Record(part);
+            }
+        }
+        work(&Motion {
+            angle: &angle,
+            torque: &torque,
+            measured: Measured {
+                channels: std::array::from_fn(|index| channels[index].as_ref().map(|one| one as &dyn Samples)),
+                ..self.measured
+            },
+            coefficients,
+            terms: terms.map(|(term, part)| part.as_ref().map_or(*term, |part| Term::Record(part))).collect(),
+        })
     }
 
     /// Builds the rows of the samples from `first` on: one column an unknown, in the order of inertia, damping, stiffness and terms,

@@ -68,6 +68,14 @@ impl Defect {
         matches!(*self, Self::Held(count) if late + SURE * error < BETWEEN * (count - 1) as f64)
     }
 
+    /// The limits that it is about.
+    pub(crate) fn limits(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Clipped { limits, .. } => Some(*limits),
+            _ => None,
+        }
+    }
+
     /// What it is called.
     #[must_use]
     pub fn name(&self) -> &'static str {

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::identify::merged::found::MergedFound;
 use crate::identify::merged::system::{Merged, Trial};
 use crate::identify::weak::decide::{is_better_within, is_odd};
-use crate::identify::weak::form::{defects_of_torque, limits_of};
+use crate::identify::weak::form::defects_of_torque;
 use crate::noise::defects::{Defect, Within, defects};
 use crate::record::samples::Samples;
 use crate::status::Status;
@@ -32,7 +32,7 @@ pub(crate) fn within_limits(
     without_common_lines(&mut spoilt);
     let whole = with_limits(merged, &spoilt, |channel| channel < angles, &mut identify)?;
     let predicted = |found: &MergedFound| (found.prediction_error, found.record_status);
-    let at_limits = |one: &Vec<Defect>| one.iter().any(|defect| limits_of(defect).is_some());
+    let at_limits = |one: &Vec<Defect>| one.iter().any(|defect| defect.limits().is_some());
     let has_limits = spoilt.iter().any(|trial| trial[angles..].iter().any(at_limits));
     if has_limits && is_odd(predicted(&whole)) {
         match with_limits(merged, &spoilt, |_| true, &mut identify) {
@@ -67,7 +67,7 @@ fn with_limits(
     identify: &mut impl FnMut(&Merged<'_>) -> Result<MergedFound, Error>,
 ) -> Result<MergedFound, Error> {
     let limits_of_channel = |(channel, defects): (usize, &Vec<Defect>)| {
-        let limits = defects.iter().find_map(limits_of).filter(|_| of(channel));
+        let limits = defects.iter().find_map(Defect::limits).filter(|_| of(channel));
         limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])
     };
     let limits: Vec<Vec<[f64; 2]>> =
@@ -106,7 +106,7 @@ fn told(mut found: MergedFound, spoilt: OfChannels, angles: usize, is_left_out: 
                 if late.is_some_and(|late| defect.acts_in_steps(late.value, late.error)) {
                     continue;
                 }
-                if limits_of(&defect).is_some() {
+                if defect.limits().is_some() {
                     if !is_left_out(channel) {
                         continue;
                     }

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use std::num::NonZeroUsize;
 use std::ops::Range;
 
-use crate::equation::motion::{Coefficient, Measured, Motion, Term, unknowns};
+use crate::equation::motion::{Motion, unknowns};
 use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::exec::pool::Watch;
@@ -21,8 +21,6 @@ use crate::local_polynomials::options::PolynomialOptions;
 use crate::local_polynomials::plan::LocalPolynomials;
 use crate::noise::channel::variance_after;
 use crate::noise::spectrum::power_in_pieces;
-use crate::record::derived::Cut;
-use crate::record::samples::Samples;
 use crate::record::subsample::stretches;
 use crate::regression::model::Model;
 use crate::weak_form::test_function::LEAST_HALF_WIDTH;
@@ -105,7 +103,7 @@ fn rows_to_scan(
     let mut orders = Vec::new();
     for part in parts {
         let (mask, weights) = (task.mask.map(|mask| &mask[part.clone()]), task.weights.map(|one| &one[part.clone()]));
-        let (rows, order) = within(&task.motion, part, |motion| {
+        let (rows, order) = task.motion.within(part, |motion| {
             let found = differentiate(plan, motion, (task.lag.unwrap_or(0.0), filter_torque), stages)?;
             Ok((rows(plan, motion, (mask, weights), true, &found), found.order))
         })?;
@@ -115,40 +113,6 @@ fn rows_to_scan(
     let middle = orders.len() / 2;
     let usual = if orders.is_empty() { 0 } else { *orders.select_nth_unstable(middle).1 };
     Ok((all, usual.into()))
-}
-
-/// Does something with a part of a motion.
-fn within<R>(motion: &Motion<'_>, part: &Range<usize>, work: impl FnOnce(&Motion<'_>) -> R) -> R {
-    let cut = |channel| Cut { channel, samples: part.clone() };
-    let (angle, torque) = (cut(motion.angle), cut(motion.torque));
-    let channels = motion.measured.channels.map(|channel| channel.map(cut));
-    let known = motion.coefficients.map(|one| match one {
-        Coefficient::Record(record) => Some(cut(record)),
-        _ => None,
-    });
-    let given = motion.terms.iter().map(|term| match *term {
-        Term::Record(record) => Some(cut(record)),
-        Term::BuiltIn(_) => None,
-    });
-    let given: Vec<_> = given.collect();
-    let terms = motion.terms.iter().zip(&given);
-    let [inertia, damping, stiffness] = &known;
-    let mut coefficients = motion.coefficients;
-    for (coefficient, part) in coefficients.iter_mut().zip([inertia, damping, stiffness]) {
-        if let Some(part) = part {
-            *coefficient = Coefficient::Record(part);
-        }
-    }
-    work(&Motion {
-        angle: &angle,
-        torque: &torque,
-        measured: Measured {
-            channels: std::array::from_fn(|index| channels[index].as_ref().map(|one| one as &dyn Samples)),
-            ..motion.measured
-        },
-        coefficients,
-        terms: terms.map(|(term, part)| part.as_ref().map_or(*term, |part| Term::Record(part))).collect(),
-    })
 }
 
 /// Where a polynomial of some order in a window passes half the power of what it is fitted to, in cycles a sample: the highest frequency there is

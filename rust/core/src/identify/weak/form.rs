@@ -12,10 +12,11 @@ use crate::identify::scanned::Scan;
 use crate::identify::weak::angle_zero::outcome::FreeOffset;
 use crate::identify::weak::angle_zero::spring::STIFFNESS;
 use crate::identify::weak::choice::Chosen;
-use crate::identify::weak::decide::{BADLY, is_better_within, is_odd};
+use crate::identify::weak::decide::BADLY;
 use crate::identify::weak::found::WeakIdentified;
 use crate::identify::weak::friction::FrictionDirection;
 use crate::identify::weak::lag::Settled;
+use crate::identify::weak::limits;
 use crate::identify::weak::options::WeakOptions;
 use crate::identify::weak::pulses::{add_pulses, allow_hidden, are_the_same, without_pulses};
 use crate::identify::weak::session::{Session, always_constant};
@@ -93,30 +94,27 @@ pub(crate) fn identify_weak(
     })
 }
 
-/// Identifies one record without some samples of its torque, and without what a recorder spoilt. A torque that stays at a limit is what a drive does, and
-/// counts: unless rows are predicted badly or widths disagree with such samples and not without them. Then the recorder had the limit.
+/// Identifies one record without some samples of its torque, and without what a recorder spoilt, its limits among that where they are the recorder's.
 ///
 /// # Errors
 /// If the record is too short, its rows do not determine what is constant, or the watch cancels.
 fn without(
     motion: &Motion<'_>,
     left_out: &[usize],
-    counted: Counted<'_>,
+    (mask, weights): Counted<'_>,
     options: &WeakOptions,
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<WeakIdentified, Error> {
-    let whole = without_limits(motion, (left_out, None), counted, options, workers, watch)?;
-    let predicted = |found: &WeakIdentified| (found.prediction_error, found.record_status);
-    if !is_odd(predicted(&whole)) {
-        return Ok(whole);
-    }
-    let Some(limits) = defects(motion.torque).iter().find_map(limits_of) else { return Ok(whole) };
-    match without_limits(motion, (left_out, Some(limits)), counted, options, workers, watch) {
-        Err(Error::Cancelled) => Err(Error::Cancelled),
-        Ok(within) if is_better_within(predicted(&whole), predicted(&within)) => Ok(within),
-        _ => Ok(whole),
-    }
+    limits::identify(motion.torque, |part, of_torque| match part {
+        None => without_limits(motion, (left_out, of_torque), (mask, weights), options, workers, watch),
+        Some(part) => motion.within(part, |motion| {
+            let left_out = left_out.iter().filter(|&place| part.contains(place)).map(|place| place - part.start);
+            let left_out: Vec<usize> = left_out.collect();
+            let counted = (mask.map(|mask| &mask[part.clone()]), weights.map(|weights| &weights[part.clone()]));
+            without_limits(motion, (&left_out, of_torque), counted, options, workers, watch)
+        }),
+    })
 }
 
 /// Identifies one record without some samples of its torque and those at its limits, where these are the recorder's, and without what a recorder spoilt.
@@ -200,15 +198,7 @@ fn lost_samples(motion: &Motion<'_>, defects: &[Vec<Defect>], watch: &mut Watch<
 
 /// The limits at which an angle that was measured alone is clipped.
 fn clipped_at(motion: &Motion<'_>, defects: &[Vec<Defect>]) -> Option<[f64; 2]> {
-    defects[0].iter().find_map(limits_of).filter(|_| is_alone(&motion.measured))
-}
-
-/// The limits that a defect is about.
-pub(crate) fn limits_of(defect: &Defect) -> Option<[f64; 2]> {
-    match defect {
-        Defect::Clipped { limits, .. } => Some(*limits),
-        _ => None,
-    }
+    defects[0].iter().find_map(Defect::limits).filter(|_| is_alone(&motion.measured))
 }
 
 /// Whether the angle is what was measured, and nothing else was.

@@ -10,6 +10,7 @@ pub(crate) mod friction;
 pub(crate) mod jumps;
 pub(crate) mod jumps_of_constants;
 pub(crate) mod lag;
+pub(crate) mod limits;
 pub(crate) mod options;
 pub(crate) mod outside_mask;
 pub(crate) mod pulses;
