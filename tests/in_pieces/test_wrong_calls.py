@@ -74,3 +74,13 @@ def test_what_progress_raises_leaves_the_copy_of_the_text(monkeypatch: pytest.Mo
     monkeypatch.setattr(copied, "copy_text", None)
     tvident.identify_file("rig.csv", "found.npy", **CALL)
     assert left() == ["found.npy"]
+
+
+def test_a_rate_that_the_times_of_the_recording_contradict_is_said(recwarn: pytest.WarningsRecorder) -> None:
+    """Half the rate made the inertia four times too large, without a word."""
+    tvident.identify_file("rig.csv", "right.npy", **CALL)
+    assert not recwarn
+    with pytest.warns(
+        recordings.FileWarning, match=r"time of rig\.csv shows 1000 Hz, not 500, which is used: .*; give that channel"
+    ):
+        tvident.identify_file("rig.csv", "wrong.npy", **CALL | {"sample_rate": 500})

@@ -6,6 +6,7 @@ from tvident._files.channels import Channels, FileError, FileWarning, channel, f
 from tvident._files.names import listed, printable
 from tvident._files.places import ENDINGS as TABLE_ENDINGS
 from tvident._files.places import check_apart, check_folder, check_place
+from tvident._files.rates import other_rate
 from tvident._files.recorded import FileRecording, increasing_times, is_time, read_recording, time_channels
 from tvident._files.recordings import read
 from tvident._files.replacement import put_in_place, replaced
@@ -36,6 +37,7 @@ __all__ = [
     "increasing_times",
     "is_time",
     "listed",
+    "other_rate",
     "place_beside",
     "printable",
     "put_in_place",

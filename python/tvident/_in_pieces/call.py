@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -14,7 +15,7 @@ from tvident import _arguments as arguments
 from tvident import _core
 from tvident._choices import VERSION
 from tvident._equation import GivenTerm
-from tvident._files import FileError, check_apart, ending_of, full_name, is_time
+from tvident._files import FileError, FileWarning, check_apart, ending_of, full_name, is_time, other_rate
 from tvident._identify import Method
 from tvident._in_pieces.copied import copied
 from tvident._in_pieces.found import FileIdentification
@@ -26,6 +27,9 @@ from tvident._in_pieces.sources import TEXT, Source, SourceChannel, opened
 from tvident._pieces import Given
 from tvident._units import Channel as Said
 from tvident._units import named_unit, times_in_seconds
+
+_TIMES = 4096
+"""Samples whose times are held against the rate that is given."""
 
 PIECE, LONG_PIECE = 1 << 18, 3 << 18
 """Samples of a piece, about, and of one in weak form in which one unknown changes: what is computed of it fits into 150 MiB.
@@ -253,9 +257,9 @@ def _recording(
     if delta is not None or rate is not None:
         if names[2] is not None:
             raise TypeError("give only one of delta, sample_rate and t; got t too; drop all but one")
-        return RecordingOfFile(
-            angle, torque, samples, 0.0, arguments.sample_period(samples, delta=delta, sample_rate=rate), axis
-        )
+        period = arguments.sample_period(samples, delta=delta, sample_rate=rate)
+        _say_other_rate(source, samples, 1 / period)
+        return RecordingOfFile(angle, torque, samples, 0.0, period, axis)
     name = names[2]
     if name is None:
         known = [one for one in source.channels if is_time(*named_unit(one))]
@@ -268,6 +272,15 @@ def _recording(
     factor = float(times_in_seconds(Said(np.ones(1), unit))[0])
     begin, period = uniform(times, samples, factor, full_name(source.channels, name, source.place))
     return RecordingOfFile(angle, torque, samples, begin, period, axis)
+
+
+def _say_other_rate(source: Source, samples: int, rate: float) -> None:
+    """Warn where the first times of a recording show another rate than the one that was given, which is used."""
+    times = [name for name, (_, count) in source.channels.items() if count == samples and is_time(*named_unit(name))]
+    first = {name: source.channels[name][0].read(0, min(samples, _TIMES)) for name in times}
+    words = other_rate(first, rate, source.place, "that channel as times") if first else None
+    if words is not None:
+        warnings.warn(words, FileWarning, stacklevel=4)
 
 
 def _of_length(source: Source, what: str, name: str, samples: int) -> tuple[SourceChannel, str]:
