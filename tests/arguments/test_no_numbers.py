@@ -56,6 +56,14 @@ def test_what_is_no_real_number_is_refused(function: str, kind: str) -> None:
         call(values)
 
 
+def test_none_among_the_torques_of_records_is_named() -> None:
+    """It was called an object that can be converted."""
+    with pytest.raises(
+        TypeError, match=r"^torque must hold numbers; got None; give an array of numbers \(record 1 of 2\)"
+    ):
+        tvident.identify([GOOD, GOOD], [GOOD, None], sample_rate=1000)  # type: ignore[list-item]
+
+
 @pytest.mark.parametrize("function", FUNCTIONS)
 @pytest.mark.parametrize(
     ("values", "message"),

@@ -124,7 +124,11 @@ def test_a_function_that_writes_to_what_it_is_given_changes_nothing(method: Any)
 @pytest.mark.parametrize(
     ("returned", "error", "message"),
     [
-        (None, TypeError, "what the function of term 'own' returns must hold numbers; got object"),
+        (
+            None,
+            TypeError,
+            "what the function of term 'own' returns must hold numbers; got None; give an array of numbers",
+        ),
         (1j * TIME, TypeError, "what the function of term 'own' returns must be real"),
         (["a"] * N, TypeError, "what the function of term 'own' returns must hold numbers; got text"),
         (TIME.astype("M8[s]"), TypeError, "what the function of term 'own' returns must hold numbers; got dates"),

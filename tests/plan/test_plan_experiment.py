@@ -99,6 +99,7 @@ def test_power_goes_where_it_tells_most() -> None:
         ({"torque_rms": None}, "torque or the time"),
         ({"band": 5}, "lowest and the highest frequency; got 5"),
         ({"band": "0.5 12"}, "lowest and the highest frequency; got 0.5 12"),
+        ({"band": [(1, 2), 3]}, r"lowest and the highest frequency; got \[\(1, 2\), 3\]"),
     ],
 )
 def test_what_is_missing_is_said(changed: dict[str, Any], words: str) -> None:

@@ -37,6 +37,8 @@ def real_array(name: str, values: npt.ArrayLike) -> npt.NDArray[np.number]:
 
 def any_array(name: str, values: npt.ArrayLike) -> npt.NDArray[np.number]:
     """Return values as an array of real numbers of any shape; masked ones are NaN."""
+    if values is None:
+        raise TypeError(f"{name} must hold numbers; got None; give an array of numbers")
     array = _as_array(name, values)
     kind = array.dtype.kind
     if kind == "c":

@@ -222,7 +222,7 @@ def _check_size(numbers: Mapping[str, float | None]) -> None:
 
 
 def _band(band: Sequence[float] | None, rate: float) -> tuple[float, float]:
-    if band is None or isinstance(band, str) or np.shape(band) != (2,):
+    if not isinstance(band, Sequence | np.ndarray) or isinstance(band, str) or [np.size(one) for one in band] != [1, 1]:
         raise ValueError(f"band must be the lowest and the highest frequency; got {band}; give band=(0.5, 12), say")
     low, high = (arguments.positive_number("band", one) for one in band)
     _check_size({"band": low})
