@@ -16,7 +16,7 @@ from tvident._commands.in_pieces import identify_in_pieces
 from tvident._commands.named import named, with_velocity
 from tvident._commands.output import PICTURE, RESULTS, SETTINGS, check_outputs, give, save_figure, say
 from tvident._commands.words import in_options
-from tvident._files import RESULT_ENDINGS, check_beside, place_beside, replaced
+from tvident._files import check_beside, keeps_result, place_beside, replaced
 from tvident._results import explained_steps
 from tvident._status import Status
 
@@ -38,7 +38,7 @@ def identify(
         identify_in_pieces(file, output, settings_output, others, options)
         return
     outputs = {RESULTS: output, PICTURE: plot, SETTINGS: settings_output}
-    table = None if output is None or Path(output).suffix.lower() in RESULT_ENDINGS else Path(output)
+    table = None if output is None or keeps_result(output) else Path(output)
     if table is not None and (beside := place_beside(table)):
         outputs["the settings beside results"] = str(beside)
     check_outputs(outputs, inputs(file, options))

@@ -15,7 +15,7 @@ from tvident._commands.given import given
 from tvident._commands.output import RECORDING, RESULTS, check_outputs, say
 from tvident._commands.words import in_options
 from tvident._equation import COEFFICIENTS
-from tvident._files import RESULT_ENDINGS, printable, write_table
+from tvident._files import keeps_result, printable, write_table
 
 
 def plan(
@@ -28,7 +28,7 @@ def plan(
     check_outputs({RESULTS: output}, {RECORDING: file})
     asked = given(options)
     if file is not None:
-        if Path(file).suffix.lower() not in RESULT_ENDINGS:
+        if not keeps_result(file):
             raise click.UsageError(
                 f"a plan goes on from a result; got '{printable(file)}'; identify a recording with tvident identify … -o result.npz, "
                 "and give that file"

@@ -12,7 +12,7 @@ import click
 
 import tvident
 from tvident import recordings
-from tvident._files import RESULT_ENDINGS, TABLE_ENDINGS, printable, settings_beside
+from tvident._files import TABLE_ENDINGS, keeps_result, printable, settings_beside
 
 _MOST_BYTES = 100_000_000
 """Of settings, which are some lines for every record of a batch."""
@@ -23,7 +23,7 @@ def read_settings(path: str) -> dict[str, Any]:
     place = printable(path)
     cure = "give a result, a file that --settings-output wrote, or options as TOML"
     ending = Path(path).suffix.lower()
-    if ending in RESULT_ENDINGS:
+    if keeps_result(path):
         result = tvident.load(path)
         if isinstance(result, tvident.IdentifiedRecords):
             raise recordings.FileError(

@@ -10,15 +10,13 @@ from tvident._files.rates import other_rate
 from tvident._files.recorded import FileRecording, increasing_times, is_time, read_recording, time_channels
 from tvident._files.recordings import read
 from tvident._files.replacement import put_in_place, replaced
-from tvident._files.results import ENDINGS as RESULT_ENDINGS
-from tvident._files.results import read_result, write_result
+from tvident._files.results import keeps_result, read_result, write_result
 from tvident._files.stated import stated_rate
 from tvident._files.table import aligned, write_csv, write_table
 from tvident._files.text import copy_text
 from tvident._files.unpacked import ending_of
 
 __all__ = [
-    "RESULT_ENDINGS",
     "TABLE_ENDINGS",
     "Channels",
     "FileError",
@@ -36,6 +34,7 @@ __all__ = [
     "full_name",
     "increasing_times",
     "is_time",
+    "keeps_result",
     "listed",
     "other_rate",
     "place_beside",

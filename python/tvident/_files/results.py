@@ -25,6 +25,11 @@ ENDINGS = (".npz", ".parquet")
 """Files that a result comes back from."""
 
 
+def keeps_result(path: str | Path) -> bool:
+    """Return whether a file of this name is one that a result comes back from."""
+    return Path(path).suffix.lower() in ENDINGS
+
+
 def write_result(path: Path, arrays: Arrays, units: Mapping[str, str], facts: str) -> None:
     """Write a result to an NPZ or Parquet file, which appears whole or not at all.
 
@@ -65,7 +70,7 @@ def read_result(path: Path) -> tuple[dict[str, npt.NDArray[Any]], str]:
         If the file is not there, damaged, or none that holds a result.
     """
     place = printable(path)
-    if path.suffix.lower() not in ENDINGS:
+    if not keeps_result(path):
         raise FileError(
             f"{place}: a result comes back from {' or '.join(ENDINGS)}; got '{printable(path.suffix)}'; other files keep columns only, "
             "and their settings beside them: read them with tvident.read_recording"

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._files import RESULT_ENDINGS, check_beside, write_settings, write_table
+from tvident._files import check_beside, keeps_result, write_settings, write_table
 from tvident._merged.drawn import drawn
 from tvident._merged.held_back import HeldBackTorque, held_back
 from tvident._merged.merging import Identifiable, Merging
@@ -361,7 +361,7 @@ class Reported(MergedSimulated, Telling, Tabular):
         Identification.save : of one record.
         """
         place = arguments.path_of("path", path)
-        if place.suffix.lower() in RESULT_ENDINGS:
+        if keeps_result(place):
             store(place, self)
         else:
             check_beside(place)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._files import RESULT_ENDINGS, check_beside, write_settings, write_table
+from tvident._files import check_beside, keeps_result, write_settings, write_table
 from tvident._results.scan import Scan
 from tvident._results.short import as_html, short
 from tvident._results.simulated import Simulated
@@ -121,7 +121,7 @@ class Shown(Simulated, Telling, Valued):
         identify_file : writes while it computes, for recordings longer than memory.
         """
         place = arguments.path_of("path", path)
-        if place.suffix.lower() in RESULT_ENDINGS:
+        if keeps_result(place):
             store(place, self._table(), self._found, self._rest())
         else:
             check_beside(place)
