@@ -253,31 +253,31 @@ def _recording(
     if not samples:
         raise ValueError(f"a recording must hold samples; {source.place} has none; check it")
     axis = units_of(angle_says, torque_says, *units)
+    times = [one for one in source.channels if is_time(*named_unit(one))]
     delta, rate = rates
     if delta is not None or rate is not None:
         if names[2] is not None:
             raise TypeError("give only one of delta, sample_rate and t; got t too; drop all but one")
         period = arguments.sample_period(samples, delta=delta, sample_rate=rate)
-        _say_other_rate(source, samples, 1 / period)
+        _say_other_rate(source, times, samples, 1 / period)
         return RecordingOfFile(angle, torque, samples, 0.0, period, axis)
     name = names[2]
     if name is None:
-        known = [one for one in source.channels if is_time(*named_unit(one))]
-        if not known:
+        if not times:
             raise TypeError(
                 f"an identification needs the sample period; {source.place} has no channel of times; give sample_rate=, delta= or t="
             )
-        name = known[0]
-    times, unit = _of_length(source, "times", name, samples)
+        name = times[0]
+    channel, unit = _of_length(source, "times", name, samples)
     factor = float(times_in_seconds(Said(np.ones(1), unit))[0])
-    begin, period = uniform(times, samples, factor, full_name(source.channels, name, source.place))
+    begin, period = uniform(channel, samples, factor, full_name(source.channels, name, source.place))
     return RecordingOfFile(angle, torque, samples, begin, period, axis)
 
 
-def _say_other_rate(source: Source, samples: int, rate: float) -> None:
+def _say_other_rate(source: Source, times: Sequence[str], samples: int, rate: float) -> None:
     """Warn where the first times of a recording show another rate than the one that was given, which is used."""
-    times = [name for name, (_, count) in source.channels.items() if count == samples and is_time(*named_unit(name))]
-    first = {name: source.channels[name][0].read(0, min(samples, _TIMES)) for name in times}
+    beside = {name: source.channels[name][0] for name in times if source.channels[name][1] == samples}
+    first = {name: channel.read(0, min(samples, _TIMES)) for name, channel in beside.items()}
     words = other_rate(first, rate, source.place, "that channel as times") if first else None
     if words is not None:
         warnings.warn(words, FileWarning, stacklevel=4)
