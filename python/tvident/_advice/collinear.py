@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tvident import _core
-from tvident._advice.lists import listed
+from tvident._arguments import listed
 from tvident._equation import BUILT_IN
 from tvident._status import Status
 

@@ -10,8 +10,7 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._advice.channels import held
-from tvident._advice.lists import listed
-from tvident._arguments import ordinal
+from tvident._arguments import listed, ordinal
 from tvident._status import Status, stretches_of
 
 _SHOWN = 6

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
-from tvident._advice.lists import listed
+from tvident._arguments import listed
 from tvident._results import Words
 
 _DIFFERS = 2.0

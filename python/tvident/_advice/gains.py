@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._advice.events import jumps_beside_pulses
-from tvident._advice.lists import listed
+from tvident._arguments import listed
 from tvident._equation import COEFFICIENTS
 
 Array = npt.NDArray[np.float64]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tvident import _core
-from tvident._advice.lists import listed
+from tvident._arguments import listed
 from tvident._equation import COEFFICIENTS
 from tvident._results import UNTOLD_LAG
 from tvident._status import Status

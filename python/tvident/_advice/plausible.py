@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from tvident._arguments import told_once
+from tvident._arguments import listed, told_once
 from tvident._results import Estimates, Words
 from tvident._units import ROTARY, Axis
 
@@ -115,7 +115,7 @@ class Plausible:
         if sign["inertia"] < 0 < sign["stiffness"]:
             return ["inertia is negative and stiffness positive: are the channels of angle and torque swapped?"]
         if sign["inertia"] < 0:
-            words = " and ".join(filter(None, (", ".join(negative[:-1]), negative[-1])))
+            words = listed(negative)
             question = f"{words} {'are' if len(negative) > 1 else 'is'} negative: is the torque's sign reversed, are the channels swapped?"
             return [
                 f"{question} The torque is the one that acts on the system; if it is the reaction to it, pass -torque"

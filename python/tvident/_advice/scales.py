@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tvident import _core
-from tvident._advice.lists import listed
-from tvident._arguments import percent, with_error
+from tvident._arguments import listed, percent, with_error
 from tvident._equation import COEFFICIENTS
 from tvident._status import Status
 

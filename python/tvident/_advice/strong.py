@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
-from tvident._advice.lists import listed
+from tvident._arguments import listed
 from tvident._equation import COEFFICIENTS
 from tvident._results import Estimates, Words
 from tvident._status import Status

@@ -24,9 +24,9 @@ from tvident._advice.events import (
 )
 from tvident._advice.instrument import fed_back
 from tvident._advice.lag import untold_lag
-from tvident._advice.lists import listed
 from tvident._advice.scales import disagreement, scales_compared
 from tvident._advice.torque import OF_TORQUE, told_by_torque
+from tvident._arguments import listed
 from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, UNITS
 from tvident._results import Words
 from tvident._status import Status

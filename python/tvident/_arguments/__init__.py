@@ -37,7 +37,7 @@ from tvident._arguments.sampling import (
     seconds,
     window_length,
 )
-from tvident._arguments.shown import nearest, shown
+from tvident._arguments.shown import listed, nearest, shown
 from tvident._arguments.times import (
     NotUniformError,
     begin_of,
@@ -89,6 +89,7 @@ __all__ = [
     "labels_of",
     "labels_out",
     "length_given",
+    "listed",
     "mask",
     "nearest",
     "one_of",

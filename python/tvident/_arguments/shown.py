@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -25,6 +25,12 @@ def shown(value: object) -> str:
         text = "a whole number of thousands of digits"
     text = " ".join(text.split())
     return text if len(text) <= _MOST else f"{text[: _MOST - 1]}…"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as they are read: one, another and a third."""
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def nearest(name: object, known: Iterable[str]) -> str:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import ast
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import click
 
+from tvident._arguments import listed
 from tvident._units import QUOTED
 
 _OTHER_NAMES = {"terms": "--term", "models": "--model", "t": "--time"}
@@ -64,11 +65,7 @@ def units_assumed(units: Mapping[str, str]) -> str:
         What they were taken for: those of ``angle``, ``torque`` and ``time``.
     """
     cures = [f"--{name}-unit" for name in units]
-    return f"Units: none said of {_and([*units])}, taken as {_and([*units.values()])}; if they are others, give {_and(cures)}"
-
-
-def _and(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+    return f"Units: none said of {listed([*units])}, taken as {listed([*units.values()])}; if they are others, give {listed(cures)}"
 
 
 def _option(found: re.Match[str], options: set[str]) -> str:

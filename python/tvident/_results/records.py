@@ -137,11 +137,6 @@ def _change(result: Identification, other: Identification, name: str, deviation:
     return np.nan_to_num(moved) if deviation > 0 else np.zeros_like(moved)
 
 
-def _listed(places: Sequence[int]) -> str:
-    """Return numbers in words."""
-    return ", ".join(map(str, places[:-1])) + f" and {places[-1]}"
-
-
 class IdentifiedRecords(TabularList, Sequence[Identification]):
     """What :func:`tvident.identify` found in a list of records: a sequence of :class:`Identification`, one a record.
 
@@ -223,7 +218,7 @@ class IdentifiedRecords(TabularList, Sequence[Identification]):
             which = (
                 f"record {shared.silent[0]} says"
                 if len(shared.silent) == 1
-                else f"records {_listed(shared.silent)} say"
+                else f"records {arguments.listed([str(one) for one in shared.silent])} say"
             )
             said.append(
                 f"{which} nothing of {names}, which is of the others alone: look whether a channel is dead, or leave it out"
