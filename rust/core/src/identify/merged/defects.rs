@@ -6,7 +6,7 @@
 use crate::error::Error;
 use crate::identify::merged::found::MergedFound;
 use crate::identify::merged::system::{Merged, Trial};
-use crate::identify::weak::decide::{is_better_within, is_odd};
+use crate::identify::weak::decide::{better_of, is_odd};
 use crate::identify::weak::form::defects_of_torque;
 use crate::noise::defects::{Defect, Within, defects};
 use crate::record::samples::Samples;
@@ -34,16 +34,12 @@ pub(crate) fn within_limits(
     let predicted = |found: &MergedFound| (found.prediction_error, found.record_status);
     let at_limits = |one: &Vec<Defect>| one.iter().any(|defect| defect.limits().is_some());
     let has_limits = spoilt.iter().any(|trial| trial[angles..].iter().any(at_limits));
-    if has_limits && is_odd(predicted(&whole)) {
-        match with_limits(merged, &spoilt, |_| true, &mut identify) {
-            Err(Error::Cancelled) => return Err(Error::Cancelled),
-            Ok(within) if is_better_within(predicted(&whole), predicted(&within)) => {
-                return Ok(told(within, spoilt, angles, |_| true));
-            }
-            _ => {}
-        }
-    }
-    Ok(told(whole, spoilt, angles, |channel| channel < angles))
+    let (found, is_within) = if has_limits && is_odd(predicted(&whole)) {
+        better_of(whole, with_limits(merged, &spoilt, |_| true, &mut identify), predicted)?
+    } else {
+        (whole, false)
+    };
+    Ok(told(found, spoilt, angles, |channel| is_within || channel < angles))
 }
 
 /// Forgets lines between readings that all channels of a trial have alike: these change no equation.

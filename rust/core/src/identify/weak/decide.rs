@@ -51,6 +51,22 @@ pub(crate) fn is_better_within(whole: Predicted, within: Predicted) -> bool {
     !within.1.contains(Status::RANK_DEFICIENT) && (within.0 < BETTER * whole.0 || agrees)
 }
 
+/// What was found within some limits where that is better, else what was found in the whole, and which of them it is.
+///
+/// # Errors
+/// If the watch cancelled.
+pub(crate) fn better_of<T>(
+    whole: T,
+    within: Result<T, Error>,
+    predicted: impl Fn(&T) -> Predicted,
+) -> Result<(T, bool), Error> {
+    match within {
+        Err(Error::Cancelled) => Err(Error::Cancelled),
+        Ok(within) if is_better_within(predicted(&whole), predicted(&within)) => Ok((within, true)),
+        _ => Ok((whole, false)),
+    }
+}
+
 impl Session<'_, '_, '_> {
     /// Chooses the length of windows where it is not given, tests which coefficients are constant, and finds jumps of windowed ones.
     pub(crate) fn decide(&mut self, chosen: &mut Chosen, model: &Model) -> Result<Decided, Error> {

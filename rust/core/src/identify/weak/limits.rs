@@ -3,10 +3,11 @@
 //! Rows tell: they are predicted badly, or widths disagree, with samples at the recorder's limits, and not without them. So a record is identified with them
 //! and without. Of a long one a part is asked first, and all of it is identified without them at once where the part says so.
 
+use std::cell::LazyCell;
 use std::ops::Range;
 
 use crate::error::Error;
-use crate::identify::weak::decide::{Predicted, is_better_within, is_odd};
+use crate::identify::weak::decide::{Predicted, better_of, is_better_within, is_odd};
 use crate::identify::weak::found::WeakIdentified;
 use crate::noise::defects::{Defect, defects};
 use crate::record::samples::Samples;
@@ -23,10 +24,10 @@ pub(crate) fn identify(
     torque: &dyn Samples,
     mut identify: impl FnMut(Option<&Range<usize>>, Option<[f64; 2]>) -> Result<WeakIdentified, Error>,
 ) -> Result<WeakIdentified, Error> {
-    let limits = || defects(torque).iter().find_map(Defect::limits);
+    let limits = LazyCell::new(|| defects(torque).iter().find_map(Defect::limits));
     let is_long = torque.len() >= 2 * PART;
     let mut within = None;
-    if let Some(limits) = if is_long { limits() } else { None } {
+    if let Some(limits) = if is_long { *limits } else { None } {
         let part = at_limits(torque, limits);
         if is_of_recorder(&mut identify, &part, limits)? {
             match identify(None, Some(limits)) {
@@ -40,16 +41,9 @@ pub(crate) fn identify(
     if !is_odd(predicted(&whole)) {
         return Ok(whole);
     }
-    let within = match (within, limits()) {
-        (Some(within), _) => Ok(within),
-        (None, Some(limits)) => identify(None, Some(limits)),
-        (None, None) => return Ok(whole),
-    };
-    match within {
-        Err(Error::Cancelled) => Err(Error::Cancelled),
-        Ok(within) if is_better_within(predicted(&whole), predicted(&within)) => Ok(within),
-        _ => Ok(whole),
-    }
+    let Some(limits) = *limits else { return Ok(whole) };
+    let within = within.map_or_else(|| identify(None, Some(limits)), Ok);
+    better_of(whole, within, predicted).map(|(found, _)| found)
 }
 
 /// Whether a part of a record is predicted badly with samples at some limits, and better without.
