@@ -27,6 +27,9 @@ CALL = "t = numpy.arange(2000) / 1000; tvident.identify(numpy.sin(9 * t), numpy.
 LATER = {"difflib", "html", "numpy.polynomial"}
 """What mistakes, notebooks and other families of functions need."""
 
+READERS = {"tvident._files.recorded", "tvident._files.recordings", "tvident._files.text"}
+"""What reads files: arrays need none of it."""
+
 OPTIONAL = {"click", "matplotlib", "pandas", "plotly", "polars", "pyarrow", "scipy", "tqdm", "xarray"}
 
 
@@ -34,11 +37,11 @@ OPTIONAL = {"click", "matplotlib", "pandas", "plotly", "polars", "pyarrow", "sci
     ("code", "forbidden"),
     [
         ("import tvident", {"numpy", "tvident._core", *SLOW, *OPTIONAL}),
-        ("import numpy; before |= set(sys.modules); import tvident; tvident.identify", {*SLOW, *OPTIONAL}),
+        ("import numpy; before |= set(sys.modules); import tvident; tvident.identify", {*SLOW, *OPTIONAL, *READERS}),
         ("import numpy; before |= set(sys.modules); import tvident; tvident.read_recording", {*SLOW, *OPTIONAL}),
         (
             f"import numpy; before |= set(sys.modules); import tvident; {CALL}",
-            {"tvident._merged", *SLOW, *OPTIONAL, *LATER},
+            {"tvident._merged", *SLOW, *OPTIONAL, *LATER, *READERS},
         ),
     ],
 )

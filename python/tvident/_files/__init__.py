@@ -1,20 +1,25 @@
 """Reads recordings from files and writes tables to them."""
 
-from tvident._files.beginnings import ending_by
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from tvident._files.beside import check_beside, place_beside, settings_beside, write_settings
 from tvident._files.channels import Channels, FileError, FileWarning, channel, full_name
 from tvident._files.names import listed, printable
 from tvident._files.places import ENDINGS as TABLE_ENDINGS
 from tvident._files.places import check_apart, check_folder, check_place
-from tvident._files.rates import other_rate
-from tvident._files.recorded import FileRecording, increasing_times, is_time, read_recording, time_channels
-from tvident._files.recordings import read
 from tvident._files.replacement import put_in_place, replaced
 from tvident._files.results import keeps_result, read_result, write_result
-from tvident._files.stated import stated_rate
 from tvident._files.table import aligned, write_csv, write_table
-from tvident._files.text import copy_text
 from tvident._files.unpacked import ending_of
+
+if TYPE_CHECKING:
+    from tvident._files.beginnings import ending_by
+    from tvident._files.rates import other_rate
+    from tvident._files.recorded import FileRecording, increasing_times, is_time, read_recording, time_channels
+    from tvident._files.recordings import read
+    from tvident._files.stated import stated_rate
+    from tvident._files.text import copy_text
 
 __all__ = [
     "TABLE_ENDINGS",
@@ -52,3 +57,24 @@ __all__ = [
     "write_settings",
     "write_table",
 ]
+
+_READERS = {
+    "ending_by": "beginnings",
+    "other_rate": "rates",
+    "FileRecording": "recorded",
+    "increasing_times": "recorded",
+    "is_time": "recorded",
+    "read_recording": "recorded",
+    "time_channels": "recorded",
+    "read": "recordings",
+    "stated_rate": "stated",
+    "copy_text": "text",
+}
+"""Where what reads comes from: entered when first asked for, since it takes a quarter of what all of `identify` takes to load."""
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _READERS:
+        raise AttributeError(f"module 'tvident._files' has no attribute {name!r}")
+    globals()[name] = getattr(import_module(f"tvident._files.{_READERS[name]}"), name)
+    return globals()[name]
