@@ -66,8 +66,10 @@ __all__ = [
     "FEWEST_WIDTHS",
     "HARDLY_TOLD_APART",
     "LEAST_PLATEAU",
+    "NEGATIVE_BEYOND",
     "NOISE_MODEL_FAILS",
     "NO_CHANCE",
+    "OFTEN",
     "OTHER_CONSTANT",
     "WEAK_INSTRUMENT",
     "AutomaticEstimates",
@@ -140,8 +142,10 @@ FEWEST_SAMPLES: int
 FEWEST_WIDTHS: int
 HARDLY_TOLD_APART: float
 LEAST_PLATEAU: float
+NEGATIVE_BEYOND: float
 NOISE_MODEL_FAILS: float
 NO_CHANCE: float
+OFTEN: float
 OTHER_CONSTANT: float
 WEAK_INSTRUMENT: float
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import chirp, lsim
 
 import tvident
 from tvident import Status
@@ -91,6 +92,30 @@ def test_what_a_record_does_not_determine_is_not_trusted() -> None:
     result = tvident.identify(*sine(), sample_rate=1000, **CONSTANT)
     assert result.record_status & (Status.ILL_CONDITIONED | Status.RANK_DEFICIENT)
     assert not result.trusted.any()
+
+
+def test_a_record_whose_signs_contradict_each_other_is_not_trusted() -> None:
+    # Every window of a sweep hears one frequency, at which inertia and stiffness trade places, and the clock of the angle jitters.
+    generator = np.random.default_rng(0)
+    rate, duration, frequency = 500, 40.0, 4.0
+    time = np.arange(int(duration * rate)) / rate
+    inertia, speed = 0.01, 2 * np.pi * frequency
+    damping, stiffness = 0.2 * inertia * speed, inertia * speed**2
+    torque = chirp(time, 0.1 * frequency, duration, 5 * frequency, method="logarithmic")
+    angle = lsim(([1.0], [inertia, damping, stiffness]), torque, time)[1]
+    angle = np.interp(time + 0.6 / rate * generator.uniform(-0.5, 0.5, time.size), time, angle)
+    angle += 1e-4 * angle.std() * generator.standard_normal(time.size)
+    torque += 1e-3 * generator.standard_normal(time.size)
+    found = tvident.identify(angle, torque, sample_rate=rate)
+    assert found.record_status & Status.ILL_CONDITIONED
+    assert not found.trusted.any()
+    assert "stiffness has both signs" in found.summary()
+    # The constants that are advised are within a hundredth.
+    assert any("try inertia='constant'" in line for line in found.advice)
+    constants: Any = dict.fromkeys(("inertia", "damping", "stiffness"), "constant")
+    again = tvident.identify(angle, torque, sample_rate=rate, **constants)
+    assert again.trusted.any()
+    assert again.value("stiffness").value == pytest.approx(stiffness, rel=0.01)
 
 
 def test_records_of_a_batch_have_flags_of_their_own(rig: tvident.Recording) -> None:

@@ -26,7 +26,8 @@ def collinear(found: _core.Identification, names: Sequence[str]) -> list[str]:
     names : sequence of str
         What its unknowns are called.
     """
-    if not found.record_status & Status.ILL_CONDITIONED or found.unexplained:
+    are_alike = found.mostly_noise or found.constants_condition > _core.HARDLY_TOLD_APART
+    if not found.record_status & Status.ILL_CONDITIONED or found.unexplained or not are_alike:
         return []
     kinds = {name: one.kind for name, one in zip(names, found.unknowns, strict=True)}
     constants = [name for name, kind in kinds.items() if kind == "constant"]

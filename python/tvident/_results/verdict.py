@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tvident import _core
 from tvident._arguments import explained_in_words, percent, percentiles, to_digits_of, told_once
 from tvident._results.torque import noise_of_compared
 from tvident._results.words import BECOMES, CONDITIONS, OTHER_UNIT, TRIED
@@ -20,12 +21,6 @@ _SYMBOLS = {"stiffness": "K", "inertia": "I", "damping": "C"}
 
 CHANGING = frozenset({"windowed", "varying", "expanded"})
 """Kinds of parameters that have a value for every sample."""
-
-_BEYOND = 2.0
-"""Standard errors below zero from which on a sample is negative, not merely uncertain."""
-
-_OFTEN = 0.05
-"""A share of the samples that is no chance."""
 
 _LITTLE = 0.5
 """A share of the torque that a model must explain to be one."""
@@ -170,10 +165,8 @@ def why_not(
     valid = result.status & Status.INVALID == 0
     if not valid.any():
         return "nothing could be identified"
-    for flag, words in _DISTRUST.items():
-        if result.record_status & flag:
-            return words
-    reason = sign()
+    # A sign that no machine has tells more than the flag that goes with it.
+    reason = sign() or next((words for flag, words in _DISTRUST.items() if result.record_status & flag), None)
     if reason:
         return reason
     if result.record_status & Status.SCALES_DISAGREE:
@@ -190,10 +183,10 @@ def negative(value: Any, error: Any) -> str | None:
     value, error = told_once(value), told_once(error)
     there = np.isfinite(value) & np.isfinite(error)
     count = int(np.count_nonzero(there))
-    below = np.count_nonzero(there & (value < -_BEYOND * error)) / count if count else 0.0
-    if below <= _OFTEN:
+    below = np.count_nonzero(there & (value < -_core.NEGATIVE_BEYOND * error)) / count if count else 0.0
+    if below <= _core.OFTEN:
         return None
-    return "is negative" + ("" if below > 1 - _OFTEN else f" in {below:.0%} of the record")
+    return "is negative" + ("" if below > 1 - _core.OFTEN else f" in {below:.0%} of the record")
 
 
 def _sign(result: Any, name: str) -> str | None:

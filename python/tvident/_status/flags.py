@@ -15,9 +15,10 @@ class Status(enum.IntFlag):
     LOWEST_ORDER, HIGHEST_ORDER, EXACT, RANK_DEFICIENT, ILL_CONDITIONED, NOISE_MODEL. Flags of a record are in ``result.record_status``
     and say what holds for the whole record: NOISE_MODEL, COLOURED, KIND_CONTRADICTED, WINDOW_LIMIT, LAG_SUSPECTED, TERM_SUSPECTED,
     SCALES_DISAGREE, CHANNEL_SUSPECTED, RANK_DEFICIENT, ILL_CONDITIONED. Three are in both groups: RANK_DEFICIENT and ILL_CONDITIONED are
-    flags of the record where they concern its constants, and of a sample where they concern the window around it; NOISE_MODEL is a flag
-    of a sample where it holds outside a mask only, or where much more is left around the sample than elsewhere in the record; of several
-    masses or trials of all samples where a channel that is late or whose gain is wrong makes a coefficient another one.
+    flags of the record where they concern its constants or signs that contradict each other, of a sample where they concern the window
+    around it; NOISE_MODEL is a flag of a sample where it holds outside a mask only, or where much more is left around the sample than
+    elsewhere in the record; of several masses or trials of all samples where a channel that is late or whose gain is wrong makes a
+    coefficient another one.
 
     See Also
     --------
@@ -137,7 +138,8 @@ _ADVICE = {
         "as the summary says"
     ),
     Status.ILL_CONDITIONED: (
-        "the regressors are nearly collinear, or the motion tells nothing of what is windowed there: look at the standard errors first"
+        "the regressors are nearly collinear, or the motion tells nothing of what is windowed there: look at the standard errors first; or "
+        "an inertia that changes has both signs, or a stiffness beside it"
     ),
 }
 

@@ -6,7 +6,7 @@ use std::ops::{BitOr, BitOrAssign};
 ///
 /// There are two groups. [`Status::INVALID`] to [`Status::ILL_CONDITIONED`] say what holds at one sample; [`Status::NOISE_MODEL`] to
 /// [`Status::CHANNEL_SUSPECTED`] concern the record. Of a record [`Status::RANK_DEFICIENT`] and [`Status::ILL_CONDITIONED`] are about what is
-/// constant; at a sample [`Status::NOISE_MODEL`] says that much more is left around it than elsewhere, or that it lies outside a mask.
+/// constant, the latter about signs that no machine has, too; at a sample [`Status::NOISE_MODEL`] says that much more is left around it than elsewhere, or that it lies outside a mask.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(transparent)]
 pub struct Status(u16);

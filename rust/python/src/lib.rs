@@ -85,6 +85,12 @@ mod _core {
     /// Condition number from which on equations hardly tell parameters apart.
     #[pymodule_export]
     const HARDLY_TOLD_APART: f64 = tvident::regression::HARDLY_TOLD_APART;
+    /// Standard errors below zero from which on a value is negative, not merely uncertain.
+    #[pymodule_export]
+    const NEGATIVE_BEYOND: f64 = tvident::regression::NEGATIVE_BEYOND;
+    /// A part of the values that is no chance.
+    #[pymodule_export]
+    const OFTEN: f64 = tvident::regression::OFTEN;
     /// F statistic of the first stage below which an instrument is weak.
     #[pymodule_export]
     const WEAK_INSTRUMENT: f64 = tvident::identify::WEAK_INSTRUMENT;

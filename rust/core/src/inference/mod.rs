@@ -10,6 +10,7 @@ pub(crate) mod missing_terms;
 pub(crate) mod moving;
 pub(crate) mod over_record;
 pub(crate) mod scales;
+pub(crate) mod signs;
 pub(crate) mod slow_curve;
 pub(crate) mod slow_equations;
 pub(crate) mod slow_points;

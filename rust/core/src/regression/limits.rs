@@ -10,6 +10,12 @@ pub const HARDLY_TOLD_APART: f64 = 500.0;
 /// A cross-validation error beyond which the rows hold more than the noise of the channels explains.
 pub const NOISE_MODEL_FAILS: f64 = 4.0;
 
+/// Standard errors below zero from which on a value is negative, not merely uncertain.
+pub const NEGATIVE_BEYOND: f64 = 2.0;
+
+/// A part of the values that is no chance.
+pub const OFTEN: f64 = 0.05;
+
 /// The part of the torque's mean square that the equations must leave of it for its noise to be worth a word: two percent of its amplitude.
 pub(crate) const UNEXPLAINED: f64 = 4e-4;
 

@@ -33,4 +33,4 @@ pub(crate) mod two_stage;
 pub(crate) mod whitening;
 pub(crate) mod window_length;
 
-pub use limits::{HARDLY_TOLD_APART, NOISE_MODEL_FAILS};
+pub use limits::{HARDLY_TOLD_APART, NEGATIVE_BEYOND, NOISE_MODEL_FAILS, OFTEN};

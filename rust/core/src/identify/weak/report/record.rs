@@ -20,6 +20,7 @@ use crate::identify::weak::session::Session;
 use crate::inference::constancy::NO_CHANCE;
 use crate::inference::identifiability::is_mostly_noise;
 use crate::inference::missing_terms::{Missing, Suspect};
+use crate::inference::signs::signs_contradict;
 use crate::regression::constants::weakest;
 use crate::regression::fit::Fit;
 use crate::regression::limits::{HARDLY_TOLD_APART, UNEXPLAINED};
@@ -115,7 +116,7 @@ impl Session<'_, '_, '_> {
         found.late = late(self.options.lag, &found.suspects, errors.is_explained(&weak.rows));
         let contradicted = self.is_contradicted(&weak, &found.constants);
         forget_what_is_said(&mut found, contradicted);
-        found.record_status = errors.status | record_status(&found, decided, at_end);
+        found.record_status = errors.status | record_status(&found, &results, decided, at_end);
         found.record_status |= if contradicted { Status::KIND_CONTRADICTED } else { Status::GOOD };
         Ok((found, Some(results)))
     }
@@ -297,12 +298,13 @@ fn forget_what_is_said(found: &mut WeakIdentified, contradicted: bool) {
 }
 
 /// Flags of the whole record, beside those of its noise.
-fn record_status(found: &WeakIdentified, decided: &Decided, at_end: bool) -> Status {
+fn record_status(found: &WeakIdentified, results: &RowResults, decided: &Decided, at_end: bool) -> Status {
     let mut status = Status::GOOD;
     if at_end || decided.has_shortest_windows() {
         status |= Status::WINDOW_LIMIT;
     }
-    if found.condition > HARDLY_TOLD_APART || found.mostly_noise || found.unexplained {
+    let is_alike = found.condition > HARDLY_TOLD_APART || found.mostly_noise;
+    if is_alike || found.unexplained || signs_contradict(&found.changing, &results.values, &results.errors) {
         status |= Status::ILL_CONDITIONED;
     }
     for suspect in found.suspects.iter().filter(|suspect| suspect.is_conspicuous()) {
