@@ -111,7 +111,7 @@ LONG = [
     ),
     Row(
         "file-every-sample",
-        "the same, `step=1`: 91 bytes a sample are written twice",
+        "the same, `step=1`: 75 bytes a sample",
         "`identify` of arrays in memory",
         _from_file(2_000_000, method="paper"),
         most=1.3,

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from tvident._files import printable
 from tvident._in_pieces.alone import NAME as LOCK
 from tvident._in_pieces.alone import alone_in
-from tvident._in_pieces.rows import read_columns, read_some, row_of, write_columns, write_rows
+from tvident._in_pieces.rows import make_room, read_columns, read_some, row_of, write_columns, write_rows
 from tvident._status import Status
 
 _FORMAT = 4
@@ -80,19 +80,21 @@ class Kept:
         self._found["facts"][name] = value
         self._write()
 
-    def add(self, columns: Columns, note: Any, head: bytes | None = None) -> None:
-        """Keep the rows of one more piece, and a note of it.
+    def add(self, columns: Columns, note: Any, of: int, head: bytes | None = None) -> None:
+        """Keep the rows of one more piece, of so many rows in all, and a note of it.
 
         With a `head` the file of all rows begins with it and is what a result may be; without one the columns of every piece lie one after
         the other, which costs half as much to write and a fifth to read.
         """
         row, begin = row_of(columns), len(head or b"")
-        with self.place.open("r+b" if self.place.exists() else "w+b") as file:
+        is_new = not self.place.exists()
+        with self.place.open("w+b" if is_new else "r+b") as file:
+            if is_new:
+                make_room(file, begin + of * row.itemsize)
             file.write(head or b"")
             # What an interrupted call wrote beyond the rows that it noted is written again.
             file.seek(begin + self._found["rows"] * row.itemsize)
             count = write_columns(file, columns) if head is None else write_rows(file, row, columns)
-            file.truncate()
         self._found["head"], self._found["are_rows"] = begin, head is not None
         self._found["pieces"].append(count)
         self._found["row"] = [[name, values.dtype.str] for name, values in columns.items()]
@@ -191,9 +193,8 @@ class Kept:
 
 def _count(status: npt.NDArray[np.uint16], counts: dict[str, int]) -> None:
     """Add how many rows have each flag."""
-    if not np.any(status):
-        return
+    there = int(np.bitwise_or.reduce(status))
     for flag in Status:
-        found = int(np.count_nonzero(status & np.uint16(flag)))
-        if found:
+        if flag & there:
+            found = int(np.count_nonzero(status & np.uint16(flag)))
             counts[str(flag.name)] = counts.get(str(flag.name), 0) + found

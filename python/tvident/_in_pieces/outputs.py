@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._files import check_folder, printable, replaced, write_csv
-from tvident._in_pieces.rows import write_rows
+from tvident._in_pieces.rows import make_room, write_rows
 
 Columns = Mapping[str, npt.NDArray[Any]]
 
@@ -72,7 +72,9 @@ def head_of_rows(row: np.dtype[Any], rows: int) -> bytes:
 @contextmanager
 def _npy(file: IO[bytes], table: OutputTable) -> Iterator[Put]:
     row = np.dtype(list(table.kinds.items()))
-    file.write(head_of_rows(row, table.rows))
+    head = head_of_rows(row, table.rows)
+    make_room(file, len(head) + table.rows * row.itemsize)
+    file.write(head)
 
     yield lambda columns: write_rows(file, row, columns)
 

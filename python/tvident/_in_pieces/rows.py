@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import sys
 from collections.abc import Mapping
 from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
 
-_AT_ONCE = 1 << 12
+_AT_ONCE = 1 << 13
 """Rows that stay in the processor's cache while one column after the other is written into them."""
+
+_KEEP_SIZE = 1
+"""Of Linux: room beyond the end of a file does not belong to what it holds."""
 
 
 def row_of(columns: Mapping[str, npt.NDArray[Any]]) -> np.dtype[Any]:
@@ -27,6 +33,30 @@ def write_rows(file: IO[bytes], row: np.dtype[Any], columns: Mapping[str, npt.ND
             some[name] = values[first : first + some.size]
         file.write(some.view(np.uint8).data)
     return count
+
+
+def make_room(file: IO[bytes], size: int) -> None:
+    """Ask the system for the room that a file will need, where it can be asked.
+
+    What is written is then given a place at once, not one by one as it is written, nor when the file takes the place of another.
+    The file is as long as before: after a failure of the machine its length says what was written.
+
+    Raises
+    ------
+    OSError
+        If there is not so much room.
+    """
+    if not sys.platform.startswith("linux") or size > sys.maxsize:
+        return
+    import ctypes  # noqa: PLC0415 - for this call alone
+
+    allocate = getattr(ctypes.CDLL(None, use_errno=True), "fallocate", None)
+    if allocate is None or allocate(file.fileno(), _KEEP_SIZE, ctypes.c_long(0), ctypes.c_long(size)) == 0:
+        return
+    number = ctypes.get_errno()
+    if number in {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}:
+        file.truncate()  # What there was is given back.
+        raise OSError(number, os.strerror(number))
 
 
 def write_columns(file: IO[bytes], columns: Mapping[str, npt.NDArray[Any]]) -> int:

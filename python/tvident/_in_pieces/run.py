@@ -125,7 +125,7 @@ class Run:
         rows = -(-self._samples // self._asked.step)
         is_result = work.is_final and holds_rows(self._output)
         head = head_of_rows(row_of(columns), rows) if is_result else None
-        self._kept.add(columns, note, head)
+        self._kept.add(columns, note, rows, head)
 
     def _progress(self, piece: Span) -> Any:
         """Return what is told of the work within a piece."""
