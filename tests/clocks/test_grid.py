@@ -43,3 +43,14 @@ def test_jitter_is_told_and_gaps_are_left_out_of_the_period(seed: int, jitter: f
 def test_a_record_that_is_mostly_gaps_is_refused() -> None:
     with pytest.raises(ValueError, match=r"t must have no gaps .* the one to t\[3\] is .* on their own"):
         grid_of(np.array([0.0, 0.011, 0.02, 500.0, 500.013]))
+
+
+@pytest.mark.parametrize("off", [8e-4, 3e-3])
+def test_one_time_off_tells_whether_a_clock_is_uniform_wherever_it_is(off: float) -> None:
+    numbers = np.delete(np.arange(20_000.0), slice(7000, 7003))
+    for place in (0, 1, 2000, 4095, 4096, 10_000, numbers.size - 1):
+        times = numbers / 1000
+        times[place] += off / 1000
+        grid = grid_of(times)
+        assert (grid.jitter == 0) == (off < 1e-3), place
+        assert grid.samples in {numbers[-1] + 1, numbers[-1]}

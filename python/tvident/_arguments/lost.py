@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import numpy.typing as npt
 
@@ -56,10 +58,14 @@ def check_no_lost_samples(t: npt.ArrayLike | None, channel: npt.NDArray[np.numbe
         return
     if _tell_lost(channel.reshape(-1, channel.shape[-1]), counts):
         longest = int(counts.argmax()) + 1
-        raise NotUniformError(
-            f"t must be uniform; samples are lost before t[{longest}] = {times[longest]:g}; leave them missing (NaN) on a uniform grid",
-            times,
-        )
+        raise NotUniformError(partial(_lost_before, longest, float(times[longest])), times)
+
+
+def _lost_before(sample: int, time: float) -> str:
+    """Return what to say of times between which samples are lost."""
+    return (
+        f"t must be uniform; samples are lost before t[{sample}] = {time:g}; leave them missing (NaN) on a uniform grid"
+    )
 
 
 def _tell_lost(channels: npt.NDArray[np.number], counts: Numbers) -> bool:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import datetime as dt
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -58,15 +60,23 @@ _SEARCHED = 1e-6
 class NotUniformError(ValueError):
     """Times increase, but not by equal steps.
 
-    Attributes
+    Parameters
     ----------
+    words : callable
+        Returns the message, which takes longer than to see that times differ, and is not asked for where these are used as they are.
     times : ndarray
         In seconds.
     """
 
-    def __init__(self, message: str, times: Seconds) -> None:
-        super().__init__(message)
+    def __init__(self, words: Callable[[], str], times: Seconds) -> None:
+        super().__init__(words, times)
         self.times = times
+
+    def __str__(self) -> str:
+        return str(self.args[0]())
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({str(self)!r})"
 
 
 def times_of(t: npt.ArrayLike) -> npt.NDArray[np.number]:
@@ -225,18 +235,23 @@ def _not_uniform(seconds: Seconds, distance: Seconds, period: float) -> ValueErr
     """Return what says where times are not uniform, and what to do."""
     if not (np.diff(seconds) > 0).all():
         return _not_increasing(seconds)
+    return NotUniformError(partial(_uneven, seconds, float(distance.max()), period), seconds)
+
+
+def _uneven(seconds: Seconds, farthest: float, period: float) -> str:
+    """Return what to say of times that increase by steps that differ, of which one lies farthest from a uniform grid."""
     # The widest step tells where; the farthest sample may be an innocent one.
-    usual = float(np.median(np.diff(seconds)))
-    place = int(np.abs(np.diff(seconds) - usual).argmax()) + 1
+    steps = np.diff(seconds)
+    usual = float(np.median(steps))
+    place = int(np.abs(steps - usual).argmax()) + 1
     cure = "resample the record onto a uniform grid" + clock_changed(seconds[place] - seconds[place - 1])
-    if float(distance.max()) < period / 2:
+    if farthest < period / 2:
         count = np.arange(seconds.size) - (seconds.size - 1) / 2
         rate = float(count @ count / (count @ (seconds - seconds[0])))
         cure += f", or give sample_rate={rate:.6g} if only the clock was read unevenly"
-    return NotUniformError(
+    return (
         f"t must be uniform; the step to t[{place}] = {seconds[place]:g} is {seconds[place] - seconds[place - 1]:g} s "
-        f"where the others are {usual:g} s; {cure}",
-        seconds,
+        f"where the others are {usual:g} s; {cure}"
     )
 
 

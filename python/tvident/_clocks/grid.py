@@ -21,6 +21,9 @@ _EVEN = 1e-3
 _FEW = (1, 10, 100)
 """Steps of so many periods tell the period to ever more digits."""
 
+_FEW_TIMES = 1 << 12
+"""Times that are asked first whether they are of a uniform clock: most that are of none show it."""
+
 _MOST_GRID = 10
 """Samples of the grid for each that was recorded, at most: beyond, the record is mostly gaps."""
 
@@ -123,13 +126,32 @@ def _with_lost_samples(times: Numbers, steps: Numbers, usual: float) -> tuple[fl
         if not few.any():
             return None
         period = float(steps[few].sum() / counts[few].sum())
-    numbers = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(steps / period), 1))])
+    printed = arguments.printed_step(times)
+    if _are_off_at_sight(times[:_FEW_TIMES], steps[: _FEW_TIMES - 1], period, printed):
+        return None
+    numbers = _numbers(steps, period)
     fitted = np.polynomial.Polynomial.fit(numbers, times - times[0], 1)
     off = float(np.abs(times - times[0] - fitted(numbers)).max())
     slope = float(fitted.deriv()(0.0))
-    printed = arguments.printed_step(times)
     allowed = max(_EVEN * slope, printed if printed < slope / 2 else 0.0)
     if off > allowed:
         return None
     exact = float(times[-1] - times[0]) / float(numbers[-1])
     return exact if off <= _EVEN * slope else slope, numbers
+
+
+def _numbers(steps: Numbers, period: float) -> Numbers:
+    """Return the numbers that a uniform clock would give samples with some steps between them."""
+    return np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(steps / period), 1))])
+
+
+def _are_off_at_sight(times: Numbers, steps: Numbers, period: float, printed: float) -> bool:
+    """Tell whether some times are certainly of no uniform clock that lost samples.
+
+    Where all lie near a line, none lies farther than twice as much from that through the first and the last of some.
+    """
+    numbers = _numbers(steps, period)
+    slope = float(times[-1] - times[0]) / float(numbers[-1])
+    off = float(np.abs(times - times[0] - slope * numbers).max())
+    # The slope of all is hardly another, and certainly not twice as large.
+    return off > 2 * max(2 * _EVEN * slope, printed)
