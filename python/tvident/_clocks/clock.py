@@ -73,13 +73,14 @@ class Clock:
     def evened(self, channels: Mapping[str, npt.NDArray[np.number]], *, propagate: bool, workers: int | None) -> Evened:
         """Return channels on the grid, and what that does to their noise."""
         grid = self.grid
-        places = grid.numbers.astype(np.float64) if self.kind == "even" else grid.places
-        samples = int(places[-1]) + 1 if self.kind == "even" else grid.samples
-        bridged = 1.5 if self.kind == "even" else grid.bridged
-        resampling = _core.Resampling(
-            places, samples, order=1 if self.kind == "even" else self.order, bridged=bridged, propagate=propagate
-        )
-        passed = None if self.kind == "even" else self.passed or Passed(resampling, workers)
+        if self.kind == "even":
+            places = grid.numbers.astype(np.float64)
+            resampling, samples = _by_number(places, propagate=propagate)
+            passed = None
+        else:
+            places, samples = grid.places, grid.samples
+            resampling = _core.Resampling(places, samples, order=self.order, bridged=grid.bridged, propagate=propagate)
+            passed = self.passed or Passed(resampling, workers)
         found = _together(resampling, channels, workers)
         return Evened(found, grid.start + self.period * np.arange(samples, dtype=np.float64), places, passed)
 
@@ -121,6 +122,12 @@ class Evened:
         left = np.clip(np.searchsorted(self.places, grid, side="right") - 1, 0, self.places.size - 1)
         right = np.clip(np.searchsorted(self.places, grid, side="left"), 0, self.places.size - 1)
         return np.asarray(mask[..., left] & mask[..., right])
+
+
+def _by_number(numbers: Numbers, *, propagate: bool) -> tuple[_core.Resampling, int]:
+    """Return how samples that were taken evenly are brought onto the grid of their numbers, and how many it has."""
+    samples = int(numbers[-1]) + 1
+    return _core.Resampling(numbers, samples, order=1, bridged=1.5, propagate=propagate), samples
 
 
 def _together(
@@ -265,9 +272,9 @@ def _smoother(
     without_gaps = bool(np.diff(places).max() <= min(whole.bridged, whole.longest))
     is_all = without_gaps and grid.samples == whole.samples and np.array_equal(places, whole.places)
     channels = {name: values[..., part] for name, values in channels.items()}
-    clock, numbers = replace(clock, grid=grid), Clock(grid, "even", 0)
+    clock = replace(clock, grid=grid)
     in_time = clock.evened(channels, propagate=False, workers=workers)
-    in_number = numbers.evened(channels, propagate=False, workers=workers)
+    in_number = _together(_by_number(grid.numbers.astype(np.float64), propagate=False)[0], channels, workers)
     passed = _of_noise(clock, in_time.passed, workers)
     gain = 1.0 if passed is None else passed.gain
     found = {}
@@ -275,7 +282,7 @@ def _smoother(
         step = quantisation if name == "angle" else 0.0
         pairs = zip(
             _core.noise(in_time.channels[name], step, passed),
-            _core.noise(in_number.channels[name], step),
+            _core.noise(in_number[name], step),
             strict=True,
         )
         ratios = [(one.sigma / other.sigma) ** 2 / gain for one, other in pairs if other.sigma > 0]
