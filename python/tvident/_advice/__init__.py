@@ -2,7 +2,7 @@
 
 from tvident._advice.channels import held, spoilt
 from tvident._advice.collinear import NOT_DISTINGUISHED
-from tvident._advice.events import events_that_stay, without_numbers
+from tvident._advice.events import events_that_stay, untold, without_numbers
 from tvident._advice.expansion import FoundExpansion, words_of_expansions
 from tvident._advice.gains import changes_of_gain
 from tvident._advice.instrument import fed_back_in_records, words_with_instrument
@@ -24,6 +24,7 @@ __all__ = [
     "fed_back_in_records",
     "held",
     "spoilt",
+    "untold",
     "without_numbers",
     "words_of_expansions",
     "words_of_search",

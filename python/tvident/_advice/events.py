@@ -157,11 +157,16 @@ def untold_here(found: _core.Identification, windowed: Sequence[str], period: fl
     # Of invalid samples, and where nothing is windowed, the flag is the record's.
     asked = np.uint16(Status.ILL_CONDITIONED | Status.INVALID)
     flagged = (found.status & asked == Status.ILL_CONDITIONED) & told_apart
-    if not (windowed and flagged.any()):
+    return untold(flagged, windowed, period * step)
+
+
+def untold(flagged: npt.NDArray[np.bool_], names: Sequence[str], seconds: float) -> list[str]:
+    """Return where the motion tells nothing of some parameters, and what to do there; samples are so many seconds apart."""
+    if not (names and flagged.any()):
         return []
     words = (
-        f"in {flagged.mean():.1%} of the record (at {_times(flagged, period * step)} s) the motion tells nothing of "
-        f"{listed(list(windowed))}: errors are as large as anything that the torques of this record suggest, and values are not trusted: "
+        f"in {flagged.mean():.1%} of the record (at {_times(flagged, seconds)} s) the motion tells nothing of "
+        f"{listed(list(names))}: errors are as large as anything that the torques of this record suggest, and values are not trusted: "
         "drive the machine there, or make it constant or 'varying', if it is"
     )
     return [words]

@@ -5,7 +5,7 @@ from tvident._expansion.expansion import Expansion
 from tvident._expansion.families import family_from, plain_family
 from tvident._expansion.fit import Curves, Fitted, Linearised
 from tvident._expansion.rivals import Rival, Rivals
-from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown, placed
+from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown, condition_of_curves, placed
 from tvident._expansion.search import (
     DERIVATIVES,
     SLACK,
@@ -35,6 +35,7 @@ __all__ = [
     "SizeSearch",
     "Tried",
     "along_record",
+    "condition_of_curves",
     "curve_along",
     "curves_of",
     "family_from",

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from tvident._expansion.basis import Basis
+from tvident._expansion.basis import AT_A_TIME, Basis
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -81,6 +81,31 @@ def placed(unknowns: Sequence[ExpandedUnknown]) -> Iterator[tuple[ExpandedUnknow
     for one in unknowns:
         yield one, slice(first, first + one.size)
         first += one.size
+
+
+def condition_of_curves(unknowns: Sequence[ExpandedUnknown], root: Array, usable: npt.NDArray[np.bool_]) -> float:
+    """Return a condition number of the rows that knows nothing of how alike the functions of an expansion are.
+
+    Harmonics of a period that is longer than the record are hardly told from each other, and the curve that they make is. It is the
+    condition of rows whose functions are orthonormal along the samples that are usable.
+
+    Parameters
+    ----------
+    unknowns : sequence of ExpandedUnknown
+    root : ndarray, shape (columns, columns)
+        A root of the covariance of the factors, as the inverse of the rows' triangular factor is.
+    usable : ndarray of bool, shape (n,)
+    """
+    some = slice(None, None, max(1, -(-usable.size // AT_A_TIME)))
+    inverse = root.copy()
+    for one, place in placed(unknowns):
+        if one.basis is not None:
+            functions = np.asarray(one.basis.along(some, 0))[usable[some]]
+            inverse[place] = np.linalg.qr(functions, mode="r") @ root[place] if len(functions) >= one.size else np.nan
+    if not np.isfinite(inverse).all():
+        return float("inf")
+    norm = np.linalg.norm(inverse, axis=1, keepdims=True)
+    return float(np.linalg.cond(inverse / norm)) if np.all(norm > 0) else float("inf")
 
 
 def parts(role: str, kernels: Kernels) -> list[Array]:

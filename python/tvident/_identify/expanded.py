@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._advice import FoundExpansion, words_of_expansions
+from tvident._advice import FoundExpansion, untold, words_of_expansions
 from tvident._equation import Term, has_kind
 from tvident._expansion import DERIVATIVES, Expansion, SizeSearch
 from tvident._identify.data import Data
@@ -98,6 +98,8 @@ class ExpandedTask:
             doubted=bool(outcome.doubts_of_windows),
             determined=bool(np.isfinite(outcome.fitted.condition)),
         )
+        asked = np.uint16(Status.ILL_CONDITIONED | Status.INVALID)
+        dark = untold(np.asarray(found.status) & asked == Status.ILL_CONDITIONED, list(curves), data.period * data.step)
         if data.labels is not None:
             found = replace(found, labels=data.labels.at(slice(None, None, data.step)))
         return Identification(
@@ -105,7 +107,7 @@ class ExpandedTask:
             time=data.time[:: data.step],
             terms=list(pilot.terms),
             jumps=(),
-            words=replace(words, advice=(*(line for _, line in data.doubts), *words.advice)),
+            words=replace(words, advice=(*(line for _, line in data.doubts), *words.advice, *dark)),
             settings=plain(outcome.settings(self._request.name)),
             recorded=self._recorded(pilot._recorded, curves),  # noqa: SLF001 - parts of this package
         )

@@ -20,6 +20,7 @@ from tvident._expansion import (
     Rivals,
     Tried,
     along_record,
+    condition_of_curves,
     curve_along,
     placed,
 )
@@ -35,6 +36,12 @@ _JUMPS = 2.0
 
 _FOLLOWED = 0.5
 """Of a jump, by which an expansion must change within the test function to follow it."""
+
+_HARDLY_KNOWN = 0.1
+"""Error, as a part of what a parameter usually is, from which on nothing is known of it where windows know nothing."""
+
+_FAR_LESS_KNOWN = 10.0
+"""Error over what it usually is, from which on nothing is known where it is larger than the parameter usually is, too."""
 
 _DOUBTS = Status.KIND_CONTRADICTED | Status.SCALES_DISAGREE
 """Flags of windows that hold for smooth functions of time, too."""
@@ -71,6 +78,14 @@ class ExpandedOutcome:
         """The mean square of the residuals over that of the noise."""
         free = self.fitted.observations - sum(one.size for one in self.unknowns)
         return self.fitted.misfit / free if free > 0 else float("nan")
+
+    @cached_property
+    def condition(self) -> float:
+        """The condition number of the equations, in the better of two bases: the functions as they are, or orthonormal ones."""
+        as_they_are = self.fitted.condition
+        if not _core.HARDLY_TOLD_APART < as_they_are < np.inf:
+            return as_they_are
+        return min(as_they_are, condition_of_curves(self.unknowns, self.fitted.root, self.given.record.usable))
 
     def with_errors_of_residuals(self) -> ExpandedOutcome:
         """Return the same with errors that know of residuals larger than the noise, and of their correlation."""
@@ -152,7 +167,7 @@ class ExpandedOutcome:
             factors={},
             covariances=self._covariances(),
             constants=constants,
-            condition=np.full(count, self.fitted.condition),
+            condition=np.full(count, self.condition),
             residual_std=np.full(count, float(np.std(left)) if left.size else np.nan),
             order=np.zeros(count, np.uint8),
             status=self._status(values, errors, step),
@@ -242,15 +257,28 @@ class ExpandedOutcome:
             missing = ~(np.isfinite(value) & np.isfinite(errors[name]))
             values[name], errors[name] = np.where(missing, np.nan, value), np.where(missing, np.nan, errors[name])
             status[missing] |= np.uint16(Status.INVALID)
+        status[self._untold(values, errors)] |= np.uint16(Status.ILL_CONDITIONED)
         return status
+
+    def _untold(self, values: Mapping[str, Array], errors: Mapping[str, Array]) -> npt.NDArray[np.bool_]:
+        """Return where the motion tells nothing of what is expanded: windows know nothing there, and no function reaches over it."""
+        asked = np.uint16(Status.ILL_CONDITIONED | Status.INVALID)
+        dark = np.asarray(self.given.pilot.status) & asked == Status.ILL_CONDITIONED
+        found: npt.NDArray[np.bool_] = np.zeros(dark.shape, np.bool_)
+        for name in self.given.expansions:
+            known = ~dark & np.isfinite(values[name])
+            if known.any():
+                usual, error = np.median(np.abs(values[name][known])), np.median(errors[name][known])
+                found |= errors[name] > np.where(dark, _HARDLY_KNOWN * usual, max(usual, _FAR_LESS_KNOWN * error))
+        return found
 
     def _record_status(self) -> Status:
         flags = Status(int(np.asarray(self.given.pilot.record_status))) & _KEPT
         if self.given.data.doubts:
             flags |= Status.CHANNEL_SUSPECTED
-        if not np.isfinite(self.fitted.condition):
+        if not np.isfinite(self.condition):
             flags |= Status.RANK_DEFICIENT
-        elif self.fitted.condition > _core.HARDLY_TOLD_APART:
+        elif self.condition > _core.HARDLY_TOLD_APART:
             flags |= Status.ILL_CONDITIONED
         if self.ratio > _core.NOISE_MODEL_FAILS:
             flags |= Status.NOISE_MODEL
