@@ -13,11 +13,12 @@ RATE = 1000.0
 
 
 def closed_loop(
-    seeds: range, *, angle_noise: float = 1e-2, torque_noise: float = 2e-3, n: int = 20_000
+    seeds: range, *, angle_noise: float = 1e-2, torque_noise: float = 2e-3, n: int = 20_000, growth: float = 0.0
 ) -> tuple[Array, Array, Array]:
     """Give angle, torque and reference of one record a seed: T = 5 (reference - angle) - 0.05 velocity, both as measured.
 
-    The torque is linear between samples, so the controller's value at a sample acts on the motion from the sample before.
+    The torque is linear between samples, so the controller's value at a sample acts on the motion from the sample before. In the second
+    half of the record the stiffness is larger by the part `growth`.
     """
     period, t = 1 / RATE, np.arange(n) / RATE
     inertia, damping, stiffness = TRUTH.values()
@@ -27,6 +28,8 @@ def closed_loop(
     system[1, :3] = [-stiffness / inertia, -damping / inertia, 1 / inertia]
     system[2, 3] = 1
     step = expm(system * period)
+    system[1, 0] *= 1 + growth
+    later = expm(system * period)
     generators = [np.random.default_rng(seed) for seed in seeds]
     noise, own = (
         size * np.stack([one.standard_normal(n) for one in generators]) for size in (angle_noise, torque_noise)
@@ -46,6 +49,7 @@ def closed_loop(
         before = measured
         following = 5 * (reference[:, k] - measured) - 0.05 * speed
         rate = (following - last) * RATE
+        step = later if 2 * k == n else step
         x, v = (step[row, 0] * x + step[row, 1] * v + step[row, 2] * last + step[row, 3] * rate for row in (0, 1))
         last = following
     return angle, torque + own, reference

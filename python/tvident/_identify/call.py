@@ -173,7 +173,8 @@ def identify(
         added. Under feedback noise of the angle is part of the torque, and estimates without an instrument are biased. All unknowns are
         then constant, and estimated by two-stage least squares: the instrument's past explains a motion, and rows of that
         motion multiply those of the recorded one. The summary has a test of exogeneity (Durbin, Wu, Hausman) and says if the instrument
-        is weak.
+        is weak. Parts of the record, each solved on its own, say whether the unknowns are constant: KIND_CONTRADICTED in
+        ``record_status`` and the advice where they are not.
     lag : float, str or "auto", optional
         Delay of the torque in seconds, or with a unit, as in ``"2 ms"``; it may be a fraction of a sample. ``"auto"``, in weak form: the
         lag nearest to zero at which the torque's rate explains nothing more, with its standard error in ``settings["lag_stderr"]``; zero

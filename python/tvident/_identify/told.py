@@ -160,7 +160,7 @@ class Told:
         """Return what there is to say of each record in weak form, or with an instrument."""
         data = self.data
         if data.instruments is not None:
-            return [words_with_instrument(one) for one in self.found]
+            return [words_with_instrument(one, [unknown.name for unknown in self.unknowns]) for one in self.found]
         tested = [one.name for one in self.unknowns if one.kind == "auto" or one.name in self.request.tested]
         variances = [one.noise.angle if one.noise else 0.0 for one in self.found]
         # What was made of several channels, or integrated, has no noise above the motion that would be the angle's alone.

@@ -17,7 +17,8 @@ pub(crate) mod widths;
 
 pub use builder::{Identify, Parameter, StrongSettings};
 pub use identification::{Covariance, Identification, Unknown, WeakDetails};
-pub use instrumented::record::{InstrumentTest, WEAK_INSTRUMENT, identify_with_instruments};
+pub use instrumented::record::{InstrumentTest, identify_with_instruments};
+pub use instrumented::two_stage_rows::WEAK_INSTRUMENT;
 pub use kinds::Kind;
 pub use merged::form::identify_merged;
 pub use merged::found::{FoundElement, MergedFound};

@@ -260,7 +260,7 @@ fn scatter(parts: &[(f64, f64)], driven: usize) -> Option<f64> {
 }
 
 /// Compares estimates of the same number, each with its variance.
-fn compare(parts: &[(f64, f64)]) -> Option<Test> {
+pub(crate) fn compare(parts: &[(f64, f64)]) -> Option<Test> {
     let usable: Vec<(f64, f64)> =
         parts.iter().copied().filter(|(value, variance)| value.is_finite() && *variance > 0.0).collect();
     if usable.len() < 2 {

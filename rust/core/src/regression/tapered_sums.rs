@@ -14,7 +14,7 @@
 use std::f64::consts::PI;
 
 /// Tapers: so many squares tell an error to 13 %; more would widen the band.
-const TAPERS: usize = 30;
+pub(crate) const TAPERS: usize = 30;
 
 /// Rows that there are at least for every taper.
 const ROWS: usize = 8;
@@ -27,10 +27,10 @@ pub(crate) struct SumCovariance {
     pub(crate) freedom: f64,
 }
 
-/// The covariance of the sums of some columns of scores.
-pub(crate) fn sum_covariance(columns: &[Vec<f64>]) -> SumCovariance {
+/// The covariance of the sums of some columns of scores, from so many tapers at most.
+pub(crate) fn sum_covariance(columns: &[Vec<f64>], most: usize) -> SumCovariance {
     let (count, rows) = (columns.len(), columns.first().map_or(0, Vec::len));
-    let tapers = TAPERS.min(rows / ROWS).max(2);
+    let tapers = most.min(rows / ROWS).max(2);
     let mut sums = vec![vec![0.0; count]; tapers];
     for row in 0..rows {
         let phase = PI * (row + 1) as f64 / (rows + 1) as f64;
@@ -61,8 +61,8 @@ mod tests {
         for repeat in 0..repeats {
             let noise = random(repeat, rows + 1);
             let difference = noise.windows(2).map(|pair| pair[1] - pair[0]).collect();
-            white += sum_covariance(&[noise]).entries[0] / repeats as f64;
-            differences += sum_covariance(&[difference]).entries[0] / repeats as f64;
+            white += sum_covariance(&[noise], TAPERS).entries[0] / repeats as f64;
+            differences += sum_covariance(&[difference], TAPERS).entries[0] / repeats as f64;
         }
         // 30 squares where 29 are counted, and 6000 of them that tell the mean to 2 %.
         assert!((white / rows as f64 * 29.0 / 30.0 - 1.0).abs() < 0.06, "{white}");

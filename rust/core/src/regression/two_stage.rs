@@ -28,8 +28,14 @@ pub(crate) struct TwoStage {
     pub(crate) strength: f64,
 }
 
-/// Solves rows whose regressors are `columns`, with one instrument for each. Neighbouring rows are correlated over `reach` rows.
-pub(crate) fn two_stage(columns: &[&[f64]], instruments: &[&[f64]], rhs: &[f64], reach: usize) -> Option<TwoStage> {
+/// Solves rows whose regressors are `columns`, with one instrument for each. Neighbouring rows are correlated over `reach` rows; errors are those of
+/// so many tapers.
+pub(crate) fn two_stage(
+    columns: &[&[f64]],
+    instruments: &[&[f64]],
+    rhs: &[f64],
+    (reach, tapers): (usize, usize),
+) -> Option<TwoStage> {
     let (rows, count) = (rhs.len(), columns.len());
     let used = (0..rows).filter(|&row| instruments.iter().any(|column| column[row] != 0.0)).count();
     if used <= 2 * count {
@@ -60,7 +66,7 @@ pub(crate) fn two_stage(columns: &[&[f64]], instruments: &[&[f64]], rhs: &[f64],
     let scores = |influence: &Mat<f64>| -> Vec<Vec<f64>> {
         (0..count).map(|one| (0..rows).map(|row| influence[(one, row)] * left[(row, 0)]).collect()).collect()
     };
-    let covariance = sum_covariance(&scores(&influence));
+    let covariance = sum_covariance(&scores(&influence), tapers);
     // Of a variance that is estimated, as Student's: errors are a little larger.
     let student = covariance.freedom / (covariance.freedom - 2.0).max(1.0);
     let entry = |index: usize| {
@@ -69,7 +75,7 @@ pub(crate) fn two_stage(columns: &[&[f64]], instruments: &[&[f64]], rhs: &[f64],
     };
     let difference = &ordinary - &influence;
     let apart = &ordinary * &b - &beta;
-    let of_difference = sum_covariance(&scores(&difference));
+    let of_difference = sum_covariance(&scores(&difference), tapers);
     let distances: Vec<f64> = (0..count).map(|one| apart[(one, 0)]).collect();
     let (squares, directions) = distance(&distances, &of_difference.entries);
     let residual = (0..rows).map(|row| left[(row, 0)].powi(2)).sum::<f64>() / (used - count) as f64;
@@ -160,7 +166,7 @@ mod tests {
     fn solve(x: &[Vec<f64>], z: &[Vec<f64>], b: &[f64], reach: usize) -> Option<TwoStage> {
         let x: Vec<&[f64]> = x.iter().map(Vec::as_slice).collect();
         let z: Vec<&[f64]> = z.iter().map(Vec::as_slice).collect();
-        two_stage(&x, &z, b, reach)
+        two_stage(&x, &z, b, (reach, 30))
     }
 
     /// How much every row adds to every unknown: `(ZᵀX)⁻¹ Zᵀ`, with plain sums.

@@ -1,4 +1,6 @@
 //! Identification with an instrument: a channel that no noise of the others reaches.
 
+pub(crate) mod constancy;
 pub(crate) mod explained;
 pub(crate) mod record;
+pub(crate) mod two_stage_rows;

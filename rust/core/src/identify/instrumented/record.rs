@@ -10,15 +10,19 @@ use crate::error::Error;
 use crate::exec::pool::Watch;
 use crate::exec::stages::Stages;
 use crate::identify::identification::{Covariance, Identification, Unknown};
+use crate::identify::instrumented::constancy::tests;
 use crate::identify::instrumented::explained::explained;
+use crate::identify::instrumented::two_stage_rows::{TwoStageRows, WEAK_INSTRUMENT};
 use crate::identify::options::{Method, Options, StrongForm, Task, WeakForm};
 use crate::identify::strong::rows::{differentiate, rows as strong_rows};
 use crate::identify::weak::form::with_record;
+use crate::inference::constancy::NO_CHANCE;
 use crate::local_polynomials::options::{Order, PolynomialOptions};
 use crate::local_polynomials::plan::LocalPolynomials;
 use crate::record::samples::Samples;
 use crate::regression::limits::status_of;
-use crate::regression::two_stage::{TwoStage, two_stage};
+use crate::regression::tapered_sums::TAPERS;
+use crate::regression::two_stage::TwoStage;
 use crate::status::Status;
 use crate::weak_form::test_function::TestFunction;
 use crate::weak_form::weak_rows::WeakRows;
@@ -32,9 +36,6 @@ const FUNCTIONS: usize = 16;
 
 /// The exponent where none is given.
 const EXPONENT: usize = 8;
-
-/// F statistic of the first stage below which estimates are biased by more than a tenth of what least squares are (Staiger, Stock 1997).
-pub const WEAK_INSTRUMENT: f64 = 10.0;
 
 /// What an instrument is worth.
 #[derive(Clone, Copy, Debug)]
@@ -180,19 +181,12 @@ fn strong(
 
 /// Two-stage least squares of rows that both motions have.
 fn solve(both: &Both, motion: &Motion<'_>) -> Option<TwoStage> {
-    let (recorded, explained) = (&both.recorded, &both.explained);
-    let there: Vec<bool> = recorded.usable.iter().zip(&explained.usable).map(|(one, other)| *one && *other).collect();
-    let column = |values: &[f64]| -> Vec<f64> {
-        values.iter().zip(&there).map(|(value, there)| if *there { *value } else { 0.0 }).collect()
-    };
-    let numbers = unknowns(&motion.coefficients, motion.terms.len());
-    let of = |rows: &Rows| -> Vec<Vec<f64>> {
-        numbers.iter().map(|&number| column(&rows.regressors[number].value)).collect()
-    };
-    let (columns, instruments) = (of(recorded), of(explained));
-    let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-    let instruments: Vec<&[f64]> = instruments.iter().map(Vec::as_slice).collect();
-    two_stage(&columns, &instruments, &column(&recorded.rhs), both.reach)
+    let columns = columns(both, motion);
+    columns.solve(0..columns.len(), (both.reach, TAPERS))
+}
+
+fn columns(both: &Both, motion: &Motion<'_>) -> TwoStageRows {
+    TwoStageRows::new(&both.recorded, &both.explained, &unknowns(&motion.coefficients, motion.terms.len()))
 }
 
 /// What was found of one record.
@@ -211,8 +205,13 @@ fn identification(
     });
     let elements = motion.angle.len().div_ceil(options.step);
     let mut record_status = found.map_or(Status::RANK_DEFICIENT, |found| status_of(found.condition));
-    if found.is_some() && test.strength < WEAK_INSTRUMENT {
+    let is_strong = found.is_some() && test.strength >= WEAK_INSTRUMENT;
+    if found.is_some() && !is_strong {
         record_status |= Status::ILL_CONDITIONED;
+    }
+    let tests = if is_strong { tests(&columns(both, motion), both.reach) } else { vec![None; count] };
+    if tests.iter().flatten().any(|test| test.probability < NO_CHANCE) {
+        record_status |= Status::KIND_CONTRADICTED;
     }
     let status = if found.is_none() { Status::INVALID | Status::RANK_DEFICIENT } else { Status::GOOD };
     let value = |one: usize| found.map_or(f64::NAN, |found| found.values[one]);
@@ -228,7 +227,11 @@ fn identification(
             Method::Strong(form) => form.regression_window,
         },
         unknowns: constants
-            .map(|(one, &number)| Unknown::constant(number, value(one), entry(one, one).sqrt()))
+            .zip(tests)
+            .map(|((one, &number), test)| Unknown {
+                test,
+                ..Unknown::constant(number, value(one), entry(one, one).sqrt())
+            })
             .collect(),
         covariances: pairs
             .filter(|(one, other)| one < other)
