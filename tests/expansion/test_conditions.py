@@ -36,13 +36,17 @@ def at_rest_from(begin: float, seed: int) -> tuple[Array, Array]:
 def test_a_fourier_series_of_time_is_trusted(seed: int) -> None:
     """Its period is longer than the record: harmonics are alike (their condition number is 6e6 here), the curve is determined."""
     rig = tvident.simulate_torsional_rig(duration=6.0, seed=seed)
-    series = Expansion("fourier", size=21)
-    result = tvident.identify(rig.angle, rig.torque, sample_rate=1000, stiffness=series, **CONSTANT)
-    assert not result.record_status & Status.ILL_CONDITIONED
-    assert result.trusted.all()
-    assert np.max(result.condition) < 100
-    score = (result.stiffness - rig.stiffness) / result.stderr["stiffness"]
-    assert np.sqrt(np.mean(score**2)) < 1.5
+    scores = []
+    for family, size in (("bspline", 16), ("fourier", 21)):
+        stiffness = Expansion(family, size=size)
+        result = tvident.identify(rig.angle, rig.torque, sample_rate=1000, stiffness=stiffness, **CONSTANT)
+        assert not result.record_status & Status.ILL_CONDITIONED
+        assert result.trusted.all()
+        assert np.max(result.condition) < 100
+        score = (result.stiffness - rig.stiffness) / result.stderr["stiffness"]
+        scores.append(np.sqrt(np.mean(score**2)))
+    # The error of one record is the same all along a curve, and nearly that of splines: it is no measure by itself.
+    assert scores[1] < 1.3 * scores[0]
 
 
 @pytest.mark.parametrize("seed", [2, *long(3, 4, 5)])
