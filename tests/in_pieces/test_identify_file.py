@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import errno
 import json
 import subprocess
 import sys
@@ -17,7 +16,7 @@ from parameters import long
 from tvident import Status
 from tvident._command_line import main
 from tvident._files import copy_text
-from tvident._in_pieces import call, choices, kept
+from tvident._in_pieces import call, choices
 from tvident._in_pieces import copied as copied_module
 
 SAMPLES = 70_001
@@ -287,38 +286,6 @@ def test_interrupted_work_goes_on_with_columns_where_rows_are_no_result(rig: tvi
     found, whole = columns_of("out.parquet"), np.load("whole.npy")
     for name in whole.dtype.names:
         assert np.array_equal(found[name], whole[name], equal_nan=True), name
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere nobody can be asked")
-def test_room_for_all_rows_is_asked_for_before_the_first(rig: tvident.Recording) -> None:
-    source = write("in.npy", rig.angle, rig.torque)
-    options: dict[str, Any] = {"angle": "angle", "torque": "torque", "sample_rate": 1000, "method": "paper"}
-    found: list[tuple[int, int]] = []
-
-    def look(_done: int, _total: int) -> None:
-        rows = Path(".out.npy.tvident/rows")
-        if rows.exists():
-            found.append((rows.stat().st_blocks * 512, rows.stat().st_size))
-
-    tvident.identify_file(source, "out.npy", **options, progress=look)
-    size = Path("out.npy").stat().st_size
-    assert min(room for room, _ in found) >= size
-    assert min(written for _, written in found) < size / 2  # how much was written is still to be seen
-
-
-def test_a_disk_without_room_is_told_before_the_work(rig: tvident.Recording, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(_file: object, size: int) -> None:
-        asked.append(size)
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    source, asked, done = write("in.npy", rig.angle, rig.torque), list[int](), list[int]()
-    monkeypatch.setattr(kept, "make_room", full)
-    options: dict[str, Any] = {"angle": "angle", "torque": "torque", "sample_rate": 1000, "method": "paper"}
-    with pytest.raises(OSError, match="No space left"):
-        tvident.identify_file(source, "out.npy", **options, progress=lambda so_far, _: done.append(so_far))
-    assert asked[0] > 75 * SAMPLES
-    assert max(done) < SAMPLES / 3  # the first piece
-    assert not Path("out.npy").exists()
 
 
 def test_a_result_takes_the_place_and_the_mode_of_another_through_links(rig: tvident.Recording) -> None:

@@ -8,7 +8,7 @@ from tvident._files.channels import Channels, FileError, FileWarning, channel, f
 from tvident._files.names import listed, printable
 from tvident._files.places import ENDINGS as TABLE_ENDINGS
 from tvident._files.places import check_apart, check_folder, check_place
-from tvident._files.replacement import put_in_place, replaced
+from tvident._files.replacement import errors_name, put_in_place, replaced
 from tvident._files.results import keeps_result, read_result, write_result
 from tvident._files.table import aligned, write_csv, write_table
 from tvident._files.unpacked import ending_of
@@ -36,6 +36,7 @@ __all__ = [
     "copy_text",
     "ending_by",
     "ending_of",
+    "errors_name",
     "full_name",
     "increasing_times",
     "is_time",

@@ -24,12 +24,18 @@ def replaced(path: Path) -> Iterator[IO[bytes]]:
     Links are followed, the mode of a file that is replaced stays. A pipe or a device is not replaced: it gets all bytes at the end.
     """
     check_folder(path)
+    with errors_name(path), _at_the_end(path) if writes_through(path) else _beside(end_of_links(path)) as file:
+        yield file
+
+
+@contextmanager
+def errors_name(path: Path) -> Iterator[None]:
+    """Let errors of the system name a file where they name none: a full disk does not say where."""
     try:
-        with _at_the_end(path) if writes_through(path) else _beside(end_of_links(path)) as file:
-            yield file
+        yield
     except OSError as error:
         if error.filename is None and error.errno is not None:
-            error.filename = str(path)  # a full disk does not say where
+            error.filename = str(path)
         raise
 
 

@@ -86,14 +86,13 @@ class Kept:
         With a `head` the file of all rows begins with it and is what a result may be; without one the columns of every piece lie one after
         the other, which costs half as much to write and a fifth to read.
         """
-        row, begin = row_of(columns), len(head or b"")
-        is_new = not self.place.exists()
-        with self.place.open("w+b" if is_new else "r+b") as file:
-            if is_new:
+        row, begin, done = row_of(columns), len(head or b""), self._found["rows"]
+        with self.place.open("r+b" if done else "w+b") as file:
+            if not done:
                 make_room(file, begin + of * row.itemsize)
             file.write(head or b"")
             # What an interrupted call wrote beyond the rows that it noted is written again.
-            file.seek(begin + self._found["rows"] * row.itemsize)
+            file.seek(begin + done * row.itemsize)
             count = write_columns(file, columns) if head is None else write_rows(file, row, columns)
         self._found["head"], self._found["are_rows"] = begin, head is not None
         self._found["pieces"].append(count)
@@ -105,8 +104,8 @@ class Kept:
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing is kept that would be missed."""
-        holds = {one.name for one in self.folder.iterdir()} - {LOCK, "state.json"}
+        """Whether nothing is kept that would be missed: rows that were not noted are written again."""
+        holds = {one.name for one in self.folder.iterdir()} - {LOCK, "state.json", self.place.name}
         return not self.has_results and not holds
 
     @property

@@ -46,7 +46,8 @@ def make_room(file: IO[bytes], size: int) -> None:
     OSError
         If there is not so much room.
     """
-    if not sys.platform.startswith("linux") or size > sys.maxsize:
+    # Of systems of 32 bits some take sizes of 64.
+    if not sys.platform.startswith("linux") or sys.maxsize < 1 << 32:
         return
     import ctypes  # noqa: PLC0415 - for this call alone
 

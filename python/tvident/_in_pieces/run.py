@@ -11,7 +11,7 @@ from typing import Any
 
 from tvident import _core
 from tvident._equation import LINEAR_UNITS, UNITS
-from tvident._files import put_in_place
+from tvident._files import errors_name, put_in_place
 from tvident._identify import Long, Span, WeakForm, requested
 from tvident._in_pieces.choices import chosen, stretches
 from tvident._in_pieces.found import FileIdentification
@@ -125,7 +125,8 @@ class Run:
         rows = -(-self._samples // self._asked.step)
         is_result = work.is_final and holds_rows(self._output)
         head = head_of_rows(row_of(columns), rows) if is_result else None
-        self._kept.add(columns, note, rows, head)
+        with errors_name(self._output):
+            self._kept.add(columns, note, rows, head)
 
     def _progress(self, piece: Span) -> Any:
         """Return what is told of the work within a piece."""
