@@ -111,7 +111,8 @@ def test_a_record_whose_signs_contradict_each_other_is_not_trusted() -> None:
     assert not found.trusted.any()
     assert "stiffness has both signs" in found.summary()
     # The constants that are advised are within a hundredth.
-    assert any("try inertia='constant'" in line for line in found.advice)
+    assert "try inertia='constant'" in found.advice[0]
+    assert "the two trade places; make constant what need not change" in found.advice[1]
     constants: Any = dict.fromkeys(("inertia", "damping", "stiffness"), "constant")
     again = tvident.identify(angle, torque, sample_rate=rate, **constants)
     assert again.trusted.any()

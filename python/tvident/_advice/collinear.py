@@ -12,12 +12,18 @@ from tvident._status import Status
 NOT_DISTINGUISHED = "cannot be distinguished"
 """Stands in the sentence: what else looks wrong may follow from it."""
 
+_BOTH_SIGNS = (
+    "an inertia that changes has both signs, or the stiffness beside it does: where windows hold one frequency the two trade places; make "
+    "constant what need not change, give one of them as known, or excite two frequencies at once"
+)
+"""What to do where signs alone tell that unknowns were not distinguished."""
+
 _TAKES_PART = 0.3
 """A constant that has at least this share in the worst determined combination is named."""
 
 
 def collinear(found: _core.Identification, names: Sequence[str]) -> list[str]:
-    """Return which constants are nearly collinear, and what would separate them.
+    """Return which constants are nearly collinear, or that signs contradict each other, and what would separate them.
 
     Parameters
     ----------
@@ -26,9 +32,10 @@ def collinear(found: _core.Identification, names: Sequence[str]) -> list[str]:
     names : sequence of str
         What its unknowns are called.
     """
-    are_alike = found.mostly_noise or found.constants_condition > _core.HARDLY_TOLD_APART
-    if not found.record_status & Status.ILL_CONDITIONED or found.unexplained or not are_alike:
+    if not found.record_status & Status.ILL_CONDITIONED or found.unexplained:
         return []
+    if not found.mostly_noise and found.constants_condition <= _core.HARDLY_TOLD_APART:
+        return [_BOTH_SIGNS]
     kinds = {name: one.kind for name, one in zip(names, found.unknowns, strict=True)}
     constants = [name for name, kind in kinds.items() if kind == "constant"]
     # Varying parameters come first among the shares.

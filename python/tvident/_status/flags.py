@@ -63,7 +63,8 @@ class Status(enum.IntFlag):
 
     ILL_CONDITIONED = 128
     """The regressors are nearly collinear, so the equations hardly distinguish the parameters: those of the window around a sample, or
-    the constants of the record. Look at the condition number, and at the standard errors before any value."""
+    the constants of the record. Or an inertia that changes has both signs in a record, or a stiffness beside it. Look at the condition
+    number, and at the standard errors before any value."""
 
     NOISE_MODEL = 256
     """The torque is predicted much worse than the noise of the channels explains: the noise is coloured, the torque is delayed, or a term
