@@ -63,7 +63,7 @@ class NotUniformError(ValueError):
     Parameters
     ----------
     words : callable
-        Returns the message, which takes longer than to see that times differ, and is not asked for where these are used as they are.
+        Returns the message. To make it takes longer than to see that steps differ, and whoever takes the times as they are needs none.
     times : ndarray
         In seconds.
     """

@@ -22,7 +22,7 @@ _FEW = (1, 10, 100)
 """Steps of so many periods tell the period to ever more digits."""
 
 _FEW_TIMES = 1 << 12
-"""Times that are asked first whether they are of a uniform clock: most that are of none show it."""
+"""Times that are looked at first: they show most clocks that are not uniform."""
 
 _MOST_GRID = 10
 """Samples of the grid for each that was recorded, at most: beyond, the record is mostly gaps."""
