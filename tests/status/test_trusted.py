@@ -119,6 +119,26 @@ def test_a_record_whose_signs_contradict_each_other_is_not_trusted() -> None:
     assert again.value("stiffness").value == pytest.approx(stiffness, rel=0.01)
 
 
+def test_a_stiffness_of_both_signs_is_trusted_where_the_motion_tells_it_from_an_inertia_that_changes() -> None:
+    generator = np.random.default_rng(0)
+    time = np.arange(10_000) / 500
+    speeds = 2 * np.pi * generator.uniform(0.3, 20, (25, 1))
+    phases = speeds * time + generator.uniform(0, 2 * np.pi, (25, 1))
+    amplitudes = 1 / (1 + (speeds / 6 / np.pi) ** 2)
+    angle, velocity, acceleration = (
+        (amplitudes * part).sum(0) for part in (np.sin(phases), speeds * np.cos(phases), -(speeds**2) * np.sin(phases))
+    )
+    inertia, stiffness = 0.01 * (1 + 0.4 * np.sin(np.pi * time / 4)), 3 + 8 * np.sin(0.4 * np.pi * time)
+    torque = inertia * acceleration + 0.05 * velocity + stiffness * angle
+    angle += 1e-4 * angle.std() * generator.standard_normal(time.size)
+    torque += 1e-3 * torque.std() * generator.standard_normal(time.size)
+    found = tvident.identify(angle, torque, sample_rate=500)
+    assert not found.record_status & Status.ILL_CONDITIONED
+    assert found.trusted.mean() > 0.9
+    assert np.median(np.abs(found.inertia / inertia - 1)) < 0.005
+    assert (found.stiffness < 0).mean() > 0.2
+
+
 def test_records_of_a_batch_have_flags_of_their_own(rig: tvident.Recording) -> None:
     n = rig.angle.size - 5
     angle = np.stack([rig.angle[:n], rig.angle[5:]])[np.newaxis]

@@ -63,8 +63,8 @@ class Status(enum.IntFlag):
 
     ILL_CONDITIONED = 128
     """The regressors are nearly collinear, so the equations hardly distinguish the parameters: those of the window around a sample, or
-    the constants of the record. Or an inertia that changes has both signs in a record, or a stiffness beside it. Look at the condition
-    number, and at the standard errors before any value."""
+    the constants of the record. Or an inertia that changes has both signs in a record, or a stiffness does where errors of both are one.
+    Look at the condition number, and at the standard errors before any value."""
 
     NOISE_MODEL = 256
     """The torque is predicted much worse than the noise of the channels explains: the noise is coloured, the torque is delayed, or a term
@@ -140,7 +140,7 @@ _ADVICE = {
     ),
     Status.ILL_CONDITIONED: (
         "the regressors are nearly collinear, or the motion tells nothing of what is windowed there: look at the standard errors first; or "
-        "an inertia that changes has both signs, or a stiffness beside it"
+        "an inertia that changes has both signs, or a stiffness does where errors of both are one"
     ),
 }
 

@@ -20,7 +20,7 @@ use crate::identify::weak::session::Session;
 use crate::inference::constancy::NO_CHANCE;
 use crate::inference::identifiability::is_mostly_noise;
 use crate::inference::missing_terms::{Missing, Suspect};
-use crate::inference::signs::signs_contradict;
+use crate::inference::signs::Changing;
 use crate::regression::constants::weakest;
 use crate::regression::fit::Fit;
 use crate::regression::limits::{HARDLY_TOLD_APART, UNEXPLAINED};
@@ -304,7 +304,14 @@ fn record_status(found: &WeakIdentified, results: &RowResults, decided: &Decided
         status |= Status::WINDOW_LIMIT;
     }
     let is_alike = found.condition > HARDLY_TOLD_APART || found.mostly_noise;
-    if is_alike || found.unexplained || signs_contradict(&found.changing, &results.values, &results.errors) {
+    let changing = Changing {
+        unknowns: &found.changing,
+        values: &results.values,
+        errors: &results.errors,
+        pairs: &found.pairs,
+        covariances: &results.covariances,
+    };
+    if is_alike || found.unexplained || changing.signs_contradict() {
         status |= Status::ILL_CONDITIONED;
     }
     for suspect in found.suspects.iter().filter(|suspect| suspect.is_conspicuous()) {
