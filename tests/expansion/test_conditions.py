@@ -60,6 +60,10 @@ def test_functions_of_time_tell_nothing_where_nothing_moves(seed: int, family: s
     assert (result.status[rests] & Status.ILL_CONDITIONED).all()
     assert not result.trusted[rests].any()
     assert any("the motion tells nothing of stiffness" in line for line in result.advice)
+    # The same at every seventh sample.
+    coarse = tvident.identify(angle, torque, sample_rate=RATE, stiffness=stiffness, step=7, **CONSTANT)
+    np.testing.assert_array_equal(coarse.status & Status.ILL_CONDITIONED, result.status[::7] & Status.ILL_CONDITIONED)
+    assert any("the motion tells nothing of stiffness" in line for line in coarse.advice)
     moves = np.arange(10_000) / RATE < 9
     assert not (result.status[moves] & Status.ILL_CONDITIONED).any()
     np.testing.assert_allclose(result.stiffness[moves][100:], 13.0, rtol=0.02)

@@ -257,13 +257,13 @@ class ExpandedOutcome:
             missing = ~(np.isfinite(value) & np.isfinite(errors[name]))
             values[name], errors[name] = np.where(missing, np.nan, value), np.where(missing, np.nan, errors[name])
             status[missing] |= np.uint16(Status.INVALID)
-        status[self._untold(values, errors)] |= np.uint16(Status.ILL_CONDITIONED)
+        status[self._untold(values, errors, step)] |= np.uint16(Status.ILL_CONDITIONED)
         return status
 
-    def _untold(self, values: Mapping[str, Array], errors: Mapping[str, Array]) -> npt.NDArray[np.bool_]:
+    def _untold(self, values: Mapping[str, Array], errors: Mapping[str, Array], step: slice) -> npt.NDArray[np.bool_]:
         """Return where the motion tells nothing of what is expanded: windows know nothing there, and no function reaches over it."""
         asked = np.uint16(Status.ILL_CONDITIONED | Status.INVALID)
-        dark = np.asarray(self.given.pilot.status) & asked == Status.ILL_CONDITIONED
+        dark = np.asarray(self.given.pilot.status)[step] & asked == Status.ILL_CONDITIONED
         found: npt.NDArray[np.bool_] = np.zeros(dark.shape, np.bool_)
         for name in self.given.expansions:
             known = ~dark & np.isfinite(values[name])
