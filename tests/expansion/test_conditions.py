@@ -69,6 +69,24 @@ def test_functions_of_time_tell_nothing_where_nothing_moves(seed: int, family: s
     np.testing.assert_allclose(result.stiffness[moves][100:], 13.0, rtol=0.02)
 
 
+@pytest.mark.parametrize(
+    ("name", "others"), [("damping", ("inertia", "stiffness")), ("inertia", ("damping", "stiffness"))]
+)
+@pytest.mark.parametrize(("begin", "seed"), [(3.0, 2), *long((3.0, 3), (10.0, 2), (10.0, 3), (16.0, 2), (16.0, 3))])
+def test_what_no_window_stands_for_is_not_told_at_rest_either(
+    name: str, others: tuple[str, str], begin: float, seed: int
+) -> None:
+    """Noise is all that is multiplied there: damping was up to 30 times too large, an inertia 0 with an error of 4 %, both trusted."""
+    angle, torque = at_rest_from(begin, seed)
+    how: dict[str, Any] = {name: Expansion("bspline", size=12), **dict.fromkeys(others, "constant")}
+    result = tvident.identify(angle, torque, sample_rate=RATE, **how)
+    t, truth = np.arange(10_000) / RATE, {"inertia": 0.0123, "damping": 0.16}[name]
+    assert not result.trusted[t > begin + 2].any()
+    assert result.trusted[t < begin].all()
+    assert np.max(np.abs(getattr(result, name) - truth)[result.trusted]) < 0.8 * truth
+    assert any(f"the motion tells nothing of {name}" in line for line in result.advice)
+
+
 def test_a_schedule_reaches_over_a_rest() -> None:
     """What depends on a position is known at rest where the machine was driven at that position."""
     angle, torque = at_rest_from(10.0, 2)

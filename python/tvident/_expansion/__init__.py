@@ -5,7 +5,7 @@ from tvident._expansion.expansion import Expansion
 from tvident._expansion.families import family_from, plain_family
 from tvident._expansion.fit import Curves, Fitted, Linearised
 from tvident._expansion.rivals import Rival, Rivals
-from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown, condition_of_curves, placed
+from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown, condition_of_curves, placed, reach_over
 from tvident._expansion.search import (
     DERIVATIVES,
     SLACK,
@@ -41,5 +41,6 @@ __all__ = [
     "family_from",
     "placed",
     "plain_family",
+    "reach_over",
     "variance_of_steps",
 ]

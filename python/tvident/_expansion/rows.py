@@ -16,6 +16,12 @@ Array: TypeAlias = npt.NDArray[np.float64]
 ROWS_A_HALF_WIDTH = 6
 """Rows carry all their information so many times in a half-width."""
 
+_UNTOLD = 1e-12
+"""Of a function's mean square: what counts as said of a function of which nothing is."""
+
+_MOVES = 4.0
+"""Mean square of what a coefficient multiplies over that of noise alone, from which on it is motion."""
+
 PIECE = 4096
 """Rows that are in memory at a time: whole blocks of the covariance's factor."""
 
@@ -108,6 +114,21 @@ def condition_of_curves(unknowns: Sequence[ExpandedUnknown], root: Array, usable
     return float(np.linalg.cond(inverse / norm)) if np.all(norm > 0) else float("inf")
 
 
+def reach_over(basis: Basis, told: npt.NDArray[np.bool_]) -> Array:
+    """Return by how much errors of a curve grow from where the motion tells it to each sample, where only those samples determine it."""
+    stride = max(1, -(-told.size // AT_A_TIME))
+    functions = np.asarray(basis.along(slice(None, None, stride), 0))
+    there = told[::stride]
+    known = functions[there]
+    if not known.any():
+        return np.ones(told.size)
+    gram = known.T @ known / len(known)
+    # Functions that are zero wherever something is told have errors without bounds.
+    gram += _UNTOLD * np.trace(gram) / len(gram) * np.eye(len(gram))
+    square = np.maximum(np.einsum("ij,ji->i", functions, np.linalg.solve(gram, functions.T)), 0.0)
+    return np.repeat(np.sqrt(square / np.median(square[there & (square > 0)])), stride)[: told.size]
+
+
 def parts(role: str, kernels: Kernels) -> list[Array]:
     """Return the kernels by which a coefficient and its derivatives multiply the angle, after integration by parts."""
     if role == "inertia":
@@ -193,6 +214,21 @@ class ExpandedRecord:
         first = np.arange(self.rows) * self.stride
         touched = missing[first + self.length] - missing[first]
         return np.asarray((touched == 0) & self.centres[first + self.half])
+
+    def moves(self, role: str, noise: float) -> npt.NDArray[np.bool_]:
+        """Return at which samples what a coefficient multiplies is more than noise of this variance, within four windows."""
+        usable, kernel = self.usable_rows(), parts(role, self.kernels)[0]
+        if not usable.any():
+            return np.ones(self.angle.size, np.bool_)
+        windows = np.lib.stride_tricks.sliding_window_view(self.angle, self.length)[:: self.stride]
+        squares = np.einsum("ij,j->i", windows, kernel) ** 2 * usable
+        around = 4 * self.lags
+        sums, counts = (np.concatenate([[0.0], np.cumsum(one)]) for one in (squares, usable))
+        rows = np.arange(self.rows)
+        first, end = np.maximum(rows - around // 2, 0), np.minimum(rows + around // 2 + 1, self.rows)
+        moves = sums[end] - sums[first] >= _MOVES * noise * np.sum(kernel**2) * (counts[end] - counts[first])
+        nearest = np.clip((np.arange(self.angle.size) - self.half + self.stride // 2) // self.stride, 0, self.rows - 1)
+        return np.asarray(moves[nearest])
 
     def pieces(self, ahead: int = 0) -> Iterator[tuple[slice, slice]]:
         """Give pieces of rows and their samples, with some rows ahead of each."""

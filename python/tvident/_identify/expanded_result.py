@@ -23,6 +23,7 @@ from tvident._expansion import (
     condition_of_curves,
     curve_along,
     placed,
+    reach_over,
 )
 from tvident._identify.expanded_inputs import ExpandedInputs
 from tvident._results import Estimates, ExpandedParameter, of_powers
@@ -261,15 +262,29 @@ class ExpandedOutcome:
         return status
 
     def _untold(self, values: Mapping[str, Array], errors: Mapping[str, Array], step: slice) -> npt.NDArray[np.bool_]:
-        """Return where the motion tells nothing of what is expanded: windows know nothing there, and no function reaches over it."""
+        """Return where the motion tells nothing of what is expanded, and no function reaches over it.
+
+        Windows in its place know nothing there, or what it multiplies is noise. That noise would make errors small, and an inertia zero:
+        errors are at least those that the motion elsewhere leaves.
+        """
         asked = np.uint16(Status.ILL_CONDITIONED | Status.INVALID)
-        dark = np.asarray(self.given.pilot.status)[step] & asked == Status.ILL_CONDITIONED
-        found: npt.NDArray[np.bool_] = np.zeros(dark.shape, np.bool_)
-        for name in self.given.expansions:
-            known = ~dark & np.isfinite(values[name])
+        of_windows = np.asarray(self.given.pilot.status)[step] & asked == Status.ILL_CONDITIONED
+        found: npt.NDArray[np.bool_] = np.zeros(of_windows.shape, np.bool_)
+        for one in self.unknowns:
+            if one.basis is None:
+                continue
+            moves, reach = np.ones(found.shape, np.bool_), np.ones(found.shape)
+            if one.role != "term":
+                moving = self.given.record.moves(one.role, self.given.noise[0])
+                if not moving.all():
+                    moves, reach = moving[step], reach_over(one.basis, moving & self.given.record.usable)[step]
+            dark = of_windows | ~moves
+            value, error = values[one.name], errors[one.name]
+            known = ~dark & np.isfinite(value)
             if known.any():
-                usual, error = np.median(np.abs(values[name][known])), np.median(errors[name][known])
-                found |= errors[name] > np.where(dark, _HARDLY_KNOWN * usual, max(usual, _FAR_LESS_KNOWN * error))
+                usual, known_to = np.median(np.abs(value[known])), np.median(error[known])
+                least = np.where(moves, error, np.maximum(error, known_to * reach))
+                found |= least > np.where(dark, _HARDLY_KNOWN * usual, max(usual, _FAR_LESS_KNOWN * known_to))
         return found
 
     def _record_status(self) -> Status:
