@@ -1,5 +1,6 @@
 """Which curves a record determines: functions that are alike, and parts without motion."""
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -95,3 +96,16 @@ def test_a_schedule_reaches_over_a_rest() -> None:
     result = tvident.identify(angle, torque, sample_rate=RATE, stiffness=schedule, **CONSTANT)
     assert not (result.status & Status.ILL_CONDITIONED).any()
     np.testing.assert_allclose(result.stiffness, 13.0, rtol=0.02)
+
+
+def test_functions_within_a_gap_are_not_determined_and_nothing_warns() -> None:
+    rig = tvident.simulate_torsional_rig(duration=6.0, seed=5)
+    angle = rig.angle.copy()
+    angle[2000:2600] = np.nan
+    cells = Expansion("haar", size=32)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        result = tvident.identify(angle, rig.torque, sample_rate=1000, stiffness=cells, **CONSTANT)
+    assert result.record_status & Status.RANK_DEFICIENT
+    assert not result.trusted.any()
+    assert any("do not determine all functions of stiffness" in line for line in result.advice)

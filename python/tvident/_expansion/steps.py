@@ -45,6 +45,7 @@ def _change(basis: Basis, factors: Array, root: Array, places: Sequence[Array], 
         noises.append(np.where(is_inside, ((beside @ root) ** 2).sum(axis=1), np.nan))
     # Beyond the first and the last cell there is none: the change on the other side stands for both.
     before, behind = (np.where(np.isnan(one), other, one) for one, other in (changes, changes[::-1]))
+    noise = sum(np.where(np.isnan(one), other, one) for one, other in (noises, noises[::-1])) / 2
     smaller = np.where(np.abs(before) < np.abs(behind), before, behind)
-    square = np.where(before * behind > 0, smaller**2, 0.0) - np.nanmean(noises, axis=0)
+    square = np.where(before * behind > 0, smaller**2, 0.0) - noise
     return np.asarray(np.sqrt(np.maximum(square, 0.0)))
