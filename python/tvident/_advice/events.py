@@ -11,7 +11,7 @@ import numpy.typing as npt
 from tvident import _core
 from tvident._advice.channels import held
 from tvident._arguments import listed, ordinal
-from tvident._status import Status, stretches_of
+from tvident._status import Status, stretches_of, untold_samples
 
 _SHOWN = 6
 """Pulses that are listed at most."""
@@ -155,9 +155,7 @@ def untold_here(found: _core.Identification, windowed: Sequence[str], period: fl
     """Return where the motion tells nothing of what is windowed, and what to do there."""
     told_apart = np.asarray(found.condition) <= _core.HARDLY_TOLD_APART
     # Of invalid samples, and where nothing is windowed, the flag is the record's.
-    asked = np.uint16(Status.ILL_CONDITIONED | Status.INVALID)
-    flagged = (found.status & asked == Status.ILL_CONDITIONED) & told_apart
-    return untold(flagged, windowed, period * step)
+    return untold(untold_samples(found.status) & told_apart, windowed, period * step)
 
 
 def untold(flagged: npt.NDArray[np.bool_], names: Sequence[str], seconds: float) -> list[str]:

@@ -20,7 +20,7 @@ from tvident._identify.methods import WeakForm
 from tvident._identify.settings import Request, plain
 from tvident._identify.task import Task
 from tvident._results import ExpandedParameter, Identification, Recorded
-from tvident._status import Status
+from tvident._status import Status, untold_samples
 
 
 def expansions_of(request: Request) -> dict[str, Expansion]:
@@ -98,8 +98,7 @@ class ExpandedTask:
             doubted=bool(outcome.doubts_of_windows),
             determined=bool(np.isfinite(outcome.fitted.condition)),
         )
-        asked = np.uint16(Status.ILL_CONDITIONED | Status.INVALID)
-        dark = untold(np.asarray(found.status) & asked == Status.ILL_CONDITIONED, list(curves), data.period * data.step)
+        dark = untold(untold_samples(found.status), list(curves), data.period * data.step)
         if data.labels is not None:
             found = replace(found, labels=data.labels.at(slice(None, None, data.step)))
         return Identification(

@@ -27,7 +27,7 @@ from tvident._expansion import (
 )
 from tvident._identify.expanded_inputs import ExpandedInputs
 from tvident._results import Estimates, ExpandedParameter, of_powers
-from tvident._status import Status
+from tvident._status import Status, untold_samples
 from tvident._units import unit_said
 
 Array = npt.NDArray[np.float64]
@@ -267,8 +267,7 @@ class ExpandedOutcome:
         Windows in its place know nothing there, or what it multiplies is noise. That noise would make errors small, and an inertia zero:
         errors are at least those that the motion elsewhere leaves.
         """
-        asked = np.uint16(Status.ILL_CONDITIONED | Status.INVALID)
-        of_windows = np.asarray(self.given.pilot.status)[step] & asked == Status.ILL_CONDITIONED
+        of_windows = untold_samples(self.given.pilot.status[step])
         found: npt.NDArray[np.bool_] = np.zeros(of_windows.shape, np.bool_)
         for one in self.unknowns:
             if one.basis is None:

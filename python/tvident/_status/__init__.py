@@ -2,6 +2,6 @@
 
 from tvident._status.counts import describe
 from tvident._status.flags import DOUBTFUL, DOUBTFUL_RECORD, RECORD_FLAGS, Status
-from tvident._status.stretches import stretches_of
+from tvident._status.stretches import stretches_of, untold_samples
 
-__all__ = ["DOUBTFUL", "DOUBTFUL_RECORD", "RECORD_FLAGS", "Status", "describe", "stretches_of"]
+__all__ = ["DOUBTFUL", "DOUBTFUL_RECORD", "RECORD_FLAGS", "Status", "describe", "stretches_of", "untold_samples"]

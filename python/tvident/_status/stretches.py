@@ -1,4 +1,4 @@
-"""Finds stretches of samples that have a flag."""
+"""Finds samples that have a flag, and stretches of them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,20 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from tvident._status.flags import Status
+
+
+def untold_samples(status: npt.NDArray[np.uint16]) -> npt.NDArray[np.bool_]:
+    """Return the samples whose values hardly anything tells: ILL_CONDITIONED, but for invalid ones, which have no value.
+
+    Examples
+    --------
+    >>> untold_samples(np.array([0, 128, 129], np.uint16)).tolist()
+    [False, True, False]
+    """
+    asked = np.uint16(Status.ILL_CONDITIONED | Status.INVALID)
+    return np.asarray(status & asked == Status.ILL_CONDITIONED)
 
 
 def stretches_of(flag: npt.NDArray[np.bool_]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
