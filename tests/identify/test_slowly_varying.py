@@ -120,7 +120,11 @@ def test_a_lag_is_not_found_in_damping_that_grows_along_a_sweep(seed: int, late:
 
 @pytest.mark.parametrize(("seed", "angle_noise"), [(0, 1e-2), *long((1, 1e-2), (2, 1e-2), (0, 1e-3), (1, 1e-3))])
 def test_along_a_sweep_what_noise_hides_draws_nothing_to_zero(seed: int, angle_noise: float) -> None:
-    """Most windows of a sweep hold hardly a frequency, and what they leave of the acceleration is noise: the inertia was 4 errors off."""
+    """Most windows of a sweep hold hardly a frequency, and what they leave of the acceleration is noise: the inertia was 4 errors off.
+
+    Nor is a lag suspected: of ten seeds each, three and four were told of one of .004 to .05 samples, 5 to 20 errors, which made errors of
+    the inertia up to twice as large.
+    """
     snr = 30 if angle_noise > 2e-3 else 40
     rig = tvident.simulate_torsional_rig(
         10.0,
@@ -136,3 +140,4 @@ def test_along_a_sweep_what_noise_hides_draws_nothing_to_zero(seed: int, angle_n
     # The curve is a few numbers, so that scores are alike all along the record: their mean square is that of two or three.
     assert np.sqrt(np.mean(scores**2)) < 2
     assert np.median(found.stderr["inertia"] / rig.inertia) < 0.02
+    assert not found.record_status & tvident.Status.LAG_SUSPECTED

@@ -158,7 +158,7 @@ impl JudgedTerm<'_> {
         Ok(fit.map(|fit| (problem, fit)))
     }
 
-    /// The same, and what each constant of the model changes by with every unit of the last of them.
+    /// The same, and what each constant of the model, and every regressor before the last, changes by with every unit of the last.
     pub(crate) fn factors_and_changes(
         &self,
         regressors: &[usize],
@@ -172,7 +172,7 @@ impl JudgedTerm<'_> {
         };
         let factors = (known..count).map(factor).collect::<Result<_, Error>>()?;
         let with_last = &fit.pooled.inverse[(count - 1) * count..];
-        let changes = with_last[..known].iter().map(|with| with / with_last[count - 1]).collect();
+        let changes = with_last[..count - 1].iter().map(|with| with / with_last[count - 1]).collect();
         Ok(Some((factors, changes)))
     }
 }
@@ -228,6 +228,38 @@ mod tests {
             let expected = DEVIATION / (ROWS as f64 * 78.0 / 80.0).sqrt();
             assert!((error / expected - 1.0).abs() < 0.15, "{error}, {expected}");
         }
+    }
+
+    #[test]
+    fn what_changes_with_the_last_regressor_is_told_of_those_before_it_too() {
+        let mut rows = rows(ROWS, |time| [1.0 + 0.01 * time, 0.01], 0.0);
+        // The second is half of the first, and something of its own.
+        let (first, own) = (random(40, ROWS), random(41, ROWS));
+        let second = first.iter().zip(&own).map(|(first, own)| 0.5 * first + own).collect();
+        for value in [first, second] {
+            rows.regressors.push(Regressor { companion: vec![0.0; ROWS], value, ..Regressor::default() });
+        }
+        let (model, covariance) = (model(), RowCovariance::by_distance(vec![1.0]));
+        let correlated = staged(|stages| model.correlated(&rows, &covariance, stages));
+        let problem = model.problem(&rows, &rows.rhs, 0.0, Some(&correlated));
+        let fit = Fit::in_rows(&problem, 80, white(1.0), Instructions::Scalar).expect("constants");
+        let judged = JudgedTerm {
+            rows: &rows,
+            model: &model,
+            rhs: &rows.rhs,
+            noise: 0.0,
+            fit: &fit,
+            covariance: &covariance,
+            correlated: &correlated,
+            expected: white(1.0),
+            inflation: 1.0,
+            instructions: Instructions::Scalar,
+        };
+        let (factors, changes) =
+            staged(|stages| judged.factors_and_changes(&[3, 4], stages)).expect("both are determined");
+        assert_eq!((factors.len(), changes.len()), (2, model.constant.len() + 1));
+        // With every unit of the second the first goes back by half a unit, as far as 800 random rows tell.
+        assert!((changes[model.constant.len()] + 0.5).abs() < 4.0 / (ROWS as f64).sqrt(), "{changes:?}");
     }
 
     #[test]

@@ -68,9 +68,9 @@ impl Changes {
 struct RowsToJudge {
     weak: WeakRows,
     rhs: Vec<f64>,
-    /// The first regressor that may be missing, and that beside what varies slowly if there is one: the torque's rate, whose own is the one before it.
+    /// The first regressor that may be missing, and the one after the last: there is what follows the torque's rate where something varies slowly.
     first: usize,
-    rate: usize,
+    end: usize,
     /// What varies slowly follows a lag by, where that is known.
     followed: Option<Vec<f64>>,
     are_some: bool,
@@ -93,7 +93,7 @@ impl Session<'_, '_, '_> {
         if !self.options.diagnose || candidates.is_empty() {
             return Ok(Suspected::default());
         }
-        let RowsToJudge { mut weak, mut rhs, first, rate, followed, are_some } =
+        let RowsToJudge { mut weak, mut rhs, first, end, followed, are_some } =
             self.rows_to_judge(all, decided, fit, &candidates)?;
         // What the torque tells is told beside a lag that may be missing, not beside one that was found; another record's may be another.
         let found_lag = usize::from(self.options.found_lag && candidates.last() == Some(&Missing::Lag));
@@ -101,7 +101,7 @@ impl Session<'_, '_, '_> {
         let mut suspects = Vec::new();
         if !is_explained {
             let (beside, regressors) =
-                (&candidates[apart..candidates.len() - found_lag], first + apart..rate - found_lag);
+                (&candidates[apart..candidates.len() - found_lag], first + apart..end - found_lag);
             suspects = self.of_torque(&weak, decided, (fit, &rhs, errors.error), regressors, beside)?;
         }
         if decided.white.is_some() {
@@ -119,7 +119,11 @@ impl Session<'_, '_, '_> {
             if is_lag && followed.is_none() {
                 continue;
             }
-            let place = if is_lag { rate } else { first + place };
+            // A lag is judged beside what follows it: where the curve of what varies slowly is hardly told, it follows anything, and what it is wrong by
+            // looks like a lag.
+            let follows = is_lag && !decided.slow.is_empty();
+            let regressors = if follows { vec![end, first + place] } else { vec![first + place] };
+            let place = first + place;
             let judged = JudgedTerm {
                 rows: &weak.rows,
                 model: &decided.model,
@@ -132,9 +136,10 @@ impl Session<'_, '_, '_> {
                 inflation: errors.inflation,
                 instructions: self.options.instructions,
             };
-            let found = judged.factors_and_changes(&[place], &mut self.stages)?;
-            let Some((factors, by_one)) = found else { continue };
-            let (value, error) = factors[0];
+            let found = judged.factors_and_changes(&regressors, &mut self.stages)?;
+            let Some((factors, mut by_one)) = found else { continue };
+            let Some((value, error)) = factors.last().copied() else { continue };
+            let share_that_follows = if follows { by_one.pop().unwrap_or(0.0) } else { 0.0 };
             // A term that is next to nothing of the torque need not be there; a lag is little of it, and much of the damping.
             let share = value * value * weak.rows.mean_square_of(place);
             if !is_lag && share < NEGLIGIBLE * weak.rows.mean_square() {
@@ -148,7 +153,7 @@ impl Session<'_, '_, '_> {
             let suspect = Suspect { missing: *missing, value: unit * value, error: unit.abs() * error };
             // What varies slowly comes first.
             let slow: Vec<f64> = match &followed {
-                Some(by) if is_lag => by.iter().map(|by| -by).collect(),
+                Some(by) if is_lag => by.iter().map(|by| share_that_follows * by).collect(),
                 _ => vec![0.0; decided.slow.len()],
             };
             let by_one: Vec<f64> = slow.into_iter().chain(by_one).collect();
@@ -185,13 +190,16 @@ impl Session<'_, '_, '_> {
         let mut weak = all.with(rows);
         let first = weak.rows.regressors.len();
         weak.rows.regressors.extend(more);
-        let rate = weak.rows.regressors.len();
+        let end = weak.rows.regressors.len();
         let followed = lag.map(|Followed { left, by }| {
-            weak.rows.regressors.push(Regressor { value: left, ..weak.rows.regressors[rate - 1].clone() });
+            let rate = &weak.rows.regressors[end - 1];
+            let value = rate.value.iter().zip(left).map(|(rate, left)| rate - left).collect();
+            let follows = Regressor { value, ..rate.clone() };
+            weak.rows.regressors.extend((!by.is_empty()).then_some(follows));
             by
         });
         weak.rows.clear_unusable();
-        Ok(RowsToJudge { weak, rhs, first, rate, followed, are_some: stretches.is_some() })
+        Ok(RowsToJudge { weak, rhs, first, end, followed, are_some: stretches.is_some() })
     }
 
     /// What is left of the torque's rate where what varies slowly follows it, in the rows of some stretches or in all.
