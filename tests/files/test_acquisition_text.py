@@ -122,13 +122,16 @@ T0 = 05.01.2024 10:00:00
             {"t": [0, *[1] * 30, 2], "x": [1, *[2] * 30, 3]},
             "'end' in line 33",
         ),
+        ("t,x,note,\n0,1,ok,\n1,2,ok,\n", {"t": [0, 1], "x": [1, 2]}, "column 'note': not read"),
+        ("t;note;x;\ns;;Nm;\n0;ok;1;\n1;ok;2;\n", {"t [s]": [0, 1], "x [Nm]": [1, 2]}, "column 'note': not read"),
+        (",t,note\n0,1,ok\n1,2,ok\n", {"0": [0, 1], "t": [1, 2]}, "column 'note': not read"),
         ("Rate,1000\nt,x,note\n0,1,ok\n1,2,ok\n", {"t": [0, 1], "x": [1, 2]}, "column 'note': not read"),
         (
             "Time,x\n23:59:59.5,1\n00:00:00.25,2\n",
             {"Time [s]": [86399.5, 86400.25], "x": [1, 2]},
-            "began again 1 times",
+            "began again once",
         ),
-        ("Time,x\n59:59.5,1\n00:00.25,2\n", {"Time [s]": [3599.5, 3600.25], "x": [1, 2]}, "began again 1 times"),
+        ("Time,x\n59:59.5,1\n00:00.25,2\n", {"Time [s]": [3599.5, 3600.25], "x": [1, 2]}, "began again once"),
         (
             "t,x\n2024-01-05T12:00:00.000000Z,1\n2024-01-05T12:00:00.000001Z,\n",
             {"t [s]": [0, 1e-6], "x": [1, NAN]},

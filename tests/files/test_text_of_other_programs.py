@@ -180,3 +180,32 @@ def test_a_packed_text_is_whole_and_of_a_size_that_recordings_have(
     place.write_bytes(gzip.compress(packed))
     with pytest.raises(recordings.FileError, match=r"this is a gzip file; unpack it$"):
         recordings.read(place)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "name", "words"),
+    [
+        (
+            "shift_jis",
+            "角度",
+            r"'\\x8ap\\x93x \[deg\]' is neither .*: it may be '角度 \[deg\]' in Shift-JIS or .*; save the file as UTF-8",
+        ),
+        ("gbk", "扭矩", r"'扭矩 \[deg\]' in GB 18030 or"),
+        ("euc_kr", "토크", r" or '토크 \[deg\]' in EUC-KR"),
+        ("cp1251", "угол", r"'угол \[deg\]' in Windows-1251"),
+    ],
+)
+def test_names_in_another_alphabet_are_said(tmp_path: Path, encoding: str, name: str, words: str) -> None:
+    place = tmp_path / "x.csv"
+    place.write_bytes(f"t [s],{name} [deg]\n0,1\n1,2\n".encode(encoding))
+    with pytest.warns(recordings.FileWarning, match=words):
+        np.testing.assert_array_equal(list(recordings.read(place).values()), [[0, 1], [1, 2]])
+
+
+@pytest.mark.parametrize("name", ["Größe [°]", "créée [µm]", "Trägheit [N·m²]", "Winkel\u00a0[°]", "Moment ± [Nm]"])
+def test_western_names_are_read_without_a_word(tmp_path: Path, name: str) -> None:
+    place = tmp_path / "x.csv"
+    place.write_bytes(f"t [s],{name}\n0,1\n1,2\n".encode("latin-1"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert list(recordings.read(place)) == ["t [s]", name]

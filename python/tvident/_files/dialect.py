@@ -241,6 +241,8 @@ def _start_with_words(lines: Sequence[str], index: int, separator: Separator) ->
         return None
     for column, kind in enumerate(kinds):
         present = [row[column] for row in rows if row[column]]
+        if kind in {"number", "time"} and not _is_number(cells[column]):
+            return None  # names above, of which one is empty
         if kind == "words" and (any(map(_is_number, present)) or all(map(_BEGINS_AS_NUMBER.match, present))):
             return None
         if kind == "words" and separator is None and any(map(_HOLDS_CELLS.search, present)):

@@ -187,7 +187,7 @@ class Rows:
         if self._words is not None:
             first, words = self._words
             where = f"line {first}" if first == self._words_end else f"lines {first} to {self._words_end}"
-            self._say(f"{where} below the numbers: not read, it holds words: '{printable(words, 60)}'")
+            self._say(f"{where} below the numbers: not read, as there are words: '{printable(words, 60)}'")
 
     def _in_bulk(self, text: str) -> Numbers | None:
         """Return the rows of a text that holds nothing but numbers, None where something else may be in it."""

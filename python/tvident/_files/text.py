@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -42,6 +42,21 @@ _HOLDS_A_NUMBER = re.compile(r"(?:^|[,;\t|])\s*[+-]?[.,]?\d[\d.,]*\s*(?:[,;\t|]|
 _OPENING = re.compile(r'(?:^|(?<=[\s,;|]))"(?![\s,;|]|$)')
 _QUOTES = re.compile('"+')
 """What begins a cell in quotes; within it quotes are doubled."""
+
+_WESTERN = re.compile("[\xa0°µ²³·±]")
+_FOREIGN = re.compile("[\x80-\x9f]|[\xa1-\xff]{3}|[\xa1-\xff][\xa1-\xbf\xd7\xf7]|[\xa1-\xbf\xd7\xf7][\xa1-\xff]")
+"""What no Western name has: controls, three letters with accents in a row, or signs beside such letters."""
+
+_ALPHABETS = {
+    "cp932": "Shift-JIS",
+    "gb18030": "GB 18030",
+    "euc_kr": "EUC-KR",
+    "cp1251": "Windows-1251",
+    "cp1252": "Windows-1252",
+}
+"""In which programs write names, where not in UTF-8."""
+
+_WESTERN_EUROPEAN = "latin-1"
 
 _COMPRESSED = {
     b"\x1f\x8b": "gzip",
@@ -103,7 +118,7 @@ def _encodings(start: bytes) -> tuple[str, ...]:
         if zeros > _MOSTLY * (len(start) // 2) and others < zeros / 20:
             return (encoding,)
     # UTF-8, or else the Western European alphabet of older programs, in which every byte is a letter.
-    return "utf-8-sig", "latin-1"
+    return "utf-8-sig", _WESTERN_EUROPEAN
 
 
 def read_columns(file: TextIO, say: Say) -> Channels:
@@ -186,12 +201,31 @@ def _begun(file: TextIO, decimal: str | None, say: Say) -> tuple[Dialect, Rows, 
         if head.strip():
             raise FileError(f"holds no numbers; {mixed_line(lines)}{CURE}")
         return None
+    if file.encoding == _WESTERN_EUROPEAN:
+        _say_foreign(dialect.names, say)
     dialect = replace(dialect, decimal=decimal)
     rows = Rows(dialect, say)
     rows.skip(dialect.first)
     first = "\n".join(lines[dialect.first :])
     pieces = chain([first], _pieces(file, head.count("\n")))
     return dialect, rows, map(rows.read, pieces)
+
+
+def _say_foreign(names: Sequence[str], say: Say) -> None:
+    """Say that names look as if they were in another alphabet than the one that they were read in."""
+    foreign = next((name for name in names if _FOREIGN.search(_WESTERN.sub(" ", name))), None)
+    if foreign is None:
+        return
+    maybe = []
+    for encoding, called in _ALPHABETS.items():
+        try:
+            name = foreign.encode(_WESTERN_EUROPEAN).decode(encoding)
+        except UnicodeError:
+            continue
+        if name != foreign:
+            maybe.append(f"'{printable(name, 40)}' in {called}")
+    known = f": it may be {' or '.join(maybe)}" if maybe else ""
+    say(f"the name '{printable(foreign, 40)}' is neither UTF-8 nor Western European{known}; save the file as UTF-8")
 
 
 def _with_whole_names(lines: list[str]) -> list[str]:
@@ -264,7 +298,8 @@ def _columns(dialect: Dialect, parts: list[Numbers], rows: Rows, say: Say) -> Ch
     for column, times in rows.times.items():
         columns[column], turns = times.unwrapped(columns[column])
         since = f"since {times.first}" if times.is_dated else "of a clock"
-        again = f", which began again {turns} times and goes on here" if turns else ""
+        often = "once" if turns == 1 else f"{turns} times"
+        again = f", which began again {often} and goes on here" if turns else ""
         say(f"column '{printable(names[column], 40)}' holds times: read as seconds {since}{again}")
         names[column] = with_unit(named_unit(names[column])[0], "s")
     return {names[column]: columns[column] for column in range(width) if column not in rows.dropped}
