@@ -126,10 +126,19 @@ def write_xlsx(file: IO[bytes], columns: Columns, units: Mapping[str, str]) -> N
         cell.data_type = "s"
         return cell
 
+    def number(value: float) -> Any:
+        """Return what becomes the number, None where it is none: openpyxl itself writes 16 digits, and some doubles have 17."""
+        if not math.isfinite(value):
+            return None
+        if float(f"{value:.16g}") == value:
+            return value
+        cell = WriteOnlyCell(sheet, repr(value))
+        cell.data_type = "n"
+        return cell
+
     sheet.append([words(f"{name} [{units[name]}]" if units.get(name) else name) for name in columns])
     lists = [
-        [words(one) if isinstance(one, str) else one if math.isfinite(one) else None for one in values.tolist()]
-        for values in columns.values()
+        [words(one) if isinstance(one, str) else number(one) for one in values.tolist()] for values in columns.values()
     ]
     for row in zip(*lists, strict=True):
         sheet.append(row)
