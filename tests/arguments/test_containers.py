@@ -160,3 +160,27 @@ def test_an_index_of_two_levels_may_belong_to_one_record() -> None:
         "if all is one record, as where levels are seconds and milliseconds, pass angle.to_numpy()"
     )
     assert_array_equal(identified(angle.to_numpy(), torque.to_numpy()).stiffness, PLAIN.stiffness)
+
+
+@pytest.mark.parametrize("name", ["time", "t", "time [s]", "Zeit", "t/ms"])
+def test_a_rate_that_labels_called_as_times_show_in_no_unit_is_refused(name: str) -> None:
+    """Nobody says that such labels are seconds, but a rate of 1000 Hz beside steps of 1/512 made the inertia four times too small."""
+    rig = tvident.simulate_torsional_rig(duration=2, sample_rate=512)
+    seconds = np.arange(rig.angle.size) / 512
+    for labels in (seconds, 1000 * seconds):
+        index = pd.Index(labels, name=name)
+        angle, torque = pd.Series(rig.angle, index), pd.Series(rig.torque, index)
+        with pytest.raises(
+            ValueError, match=r"labels of the samples, which are called as times are; got 0.001 s \(1000"
+        ):
+            tvident.identify(angle, torque, sample_rate=1000)
+        found = tvident.identify(angle, torque, sample_rate=512)
+        assert found.settings["sample_rate"] == 512
+    coordinates = {name: seconds}
+    arrays = [xr.DataArray(one, dims=name, coords=coordinates) for one in (rig.angle, rig.torque)]
+    with pytest.raises(ValueError, match="called as times are"):
+        tvident.identify(*arrays, sample_rate=1000)
+    counted = pd.RangeIndex(rig.angle.size, name=name)
+    tvident.identify(pd.Series(rig.angle, counted), pd.Series(rig.torque, counted), sample_rate=512)
+    turns = pd.Index(seconds, name="position")
+    tvident.fit_local_polynomials(pd.Series(rig.angle, turns), 51, delta=1)

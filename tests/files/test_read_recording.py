@@ -240,3 +240,19 @@ def test_ends_of_a_part_and_rates_are_numbers() -> None:
     assert recording.select(0.5, np.inf)["angle"].size == 50
     with pytest.raises(ValueError, match="sample_rate must be positive and finite; got 0"):
         tvident.FileRecording({"angle": np.zeros(10)}, sample_rate=0)
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "ms"), (1e6, "us"), (1e9, "ns")])
+def test_counts_since_1970_are_no_seconds(tmp_path: Path, factor: float, unit: str) -> None:
+    """Stamps of a computer in ms were a recording of 0.1 Hz, without a word."""
+    stamps = np.int64(1_700_000_000 * factor) + (np.arange(50) * (factor / 100)).astype(np.int64)
+    for header, is_known in (("timestamp", False), (f"timestamp [{unit}]", True)):
+        (tmp_path / "x.csv").write_text(f"{header},angle\n" + "".join(f"{one},1\n" for one in stamps))
+        recording = tvident.read_recording(tmp_path / "x.csv")
+        if is_known:
+            assert recording.sample_rate == pytest.approx(100, rel=1e-6)
+        else:
+            with pytest.raises(
+                ValueError, match=rf"would be of the year \d+ .*'time \[{unit}\]', or give t= and time_unit='{unit}'"
+            ):
+                _ = recording.sample_rate

@@ -13,6 +13,7 @@ from tvident._arguments.arrays import (
 from tvident._arguments.channels import as_record, channel, channels
 from tvident._arguments.containers import fields_of, is_table, package_of, plain, time_axis
 from tvident._arguments.digits import explained_in_words, ordinal, own_digits, percent, to_digits_of, with_error
+from tvident._arguments.labelled import check_against_labels, implied_times, is_called_time
 from tvident._arguments.labels import Labels, labels_in, labels_of, labels_out
 from tvident._arguments.lost import check_no_lost_samples
 from tvident._arguments.numbers import (
@@ -41,9 +42,7 @@ from tvident._arguments.shown import listed, nearest, shown
 from tvident._arguments.times import (
     NotUniformError,
     begin_of,
-    check_against_labels,
     clock_changed,
-    implied_times,
     irregular_at_sight,
     printed_step,
     rounding,
@@ -82,6 +81,7 @@ __all__ = [
     "flag",
     "implied_times",
     "irregular_at_sight",
+    "is_called_time",
     "is_read_as_it_is",
     "is_table",
     "is_word",

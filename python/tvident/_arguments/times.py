@@ -13,8 +13,7 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._arguments.arrays import real_array
-from tvident._arguments.containers import package_of, plain
-from tvident._units import ROTARY, is_convertible, times_in_seconds, unit_said
+from tvident._arguments.containers import plain
 
 Seconds = npt.NDArray[np.float64]
 
@@ -46,9 +45,6 @@ _FEW_SHARED = 0.01
 """So few samples that have the time of another are mistakes, not times that are too coarse."""
 
 _HALVINGS = 50
-
-_OTHER_RATE = 0.1
-"""Times of few digits and gaps move steps by less than this part; a wrong rate is off by more."""
 
 _NOT_AN_HOUR = 60.0
 """Seconds by which a step may differ from an hour and still be that of summer time."""
@@ -125,49 +121,6 @@ def _dates(values: Any) -> Any:
 def begin_of(t: npt.ArrayLike | None) -> float:
     """Return the time of the first sample in seconds: 0 where times are dates, or were not given."""
     return 0.0 if t is None else float(times_of(t).flat[0])
-
-
-def implied_times(values: Any) -> Any:
-    """Return the times that a container says its samples have: an index of dates or durations; None where it has none.
-
-    Plain numbers are none, since nobody says whether they are seconds. With xarray the attribute ``units`` may say so.
-    """
-    if package_of(values) == "pandas" and hasattr(values, "index"):
-        return values.index if _says_times(values.index) else None
-    if package_of(values) == "xarray" and hasattr(values, "dims"):
-        for dim in values.dims:
-            coordinate = values.coords.get(dim)
-            if coordinate is not None and _says_times(coordinate):
-                return coordinate
-    return None
-
-
-def _says_times(labels: Any) -> bool:
-    """Return whether labels are dates or durations, or numbers in a unit of time."""
-    kind = getattr(getattr(labels, "dtype", None), "kind", "O")
-    if kind in "mM":
-        return True
-    return kind in "iuf" and is_convertible(ROTARY, "time", unit_said(labels))
-
-
-def check_against_labels(values: Any, period: float) -> None:
-    """Refuse a sample period that is another than what a container says its samples have.
-
-    Raises
-    ------
-    ValueError
-        If both the mean and the median step of the labels are far from it.
-    """
-    implied = implied_times(values)
-    if implied is None or len(implied) < 2:  # noqa: PLR2004 - a step
-        return
-    seconds = np.asarray(times_of(times_in_seconds(implied)), dtype=np.float64)
-    steps = (float(np.median(np.diff(seconds))), float(seconds[-1] - seconds[0]) / (seconds.size - 1))
-    if all(step > 0 and abs(period / step - 1) > _OTHER_RATE for step in steps):
-        raise ValueError(
-            f"the sample period must be that of the times that the samples are labelled with; got {period:.6g} s ({1 / period:.6g} Hz), "
-            f"and labels {steps[0]:.6g} s apart ({1 / steps[0]:.6g} Hz); leave it out, or pass .to_numpy() if the labels are wrong"
-        )
 
 
 def period_of_times(t: npt.ArrayLike, samples: int) -> float:

@@ -29,22 +29,23 @@ from tvident._units import (
     with_unit,
 )
 
-_TIME = re.compile(
-    r"(t|time|times|zeit|temps|tiempo|tempo|x_value|timestamps?|elapsed( time)?|time_?stamp)([ _.-]?\d+)?",
-    re.IGNORECASE,
-)
-"""What a channel of times is called."""
-
 _RATE = re.compile(r"(fs|f_s|fsamp|sample_?rate|sampling_?(rate|frequency)|samplerate|fsample|rate)", re.IGNORECASE)
 
 _PERIOD = re.compile(r"(ts|dt|delta_?t|t_?sample|t_?samp|sampl(e|ing)_?(time|period|interval))", re.IGNORECASE)
 """What single numbers are called that are samples per second, and seconds per sample."""
 
 
+_YEAR = 31_556_952.0
+"""Seconds."""
+
+_COUNTS = (("ns", "nanoseconds", 1e17), ("us", "microseconds", 1e14), ("ms", "milliseconds", 1e11))
+"""Times from which on they are no seconds, but, from the year 1973 on, these parts of them."""
+
+
 def time_channels(names: Iterable[str]) -> list[str]:
     """Return the names, without units and groups, of channels that are called as times are."""
     bare = (named_unit(name)[0].rpartition(".")[2] for name in names)
-    return [name for name in bare if _TIME.fullmatch(name)]
+    return [name for name in bare if arguments.is_called_time(name)]
 
 
 def _increases(values: npt.NDArray[Any]) -> bool:
@@ -178,6 +179,7 @@ class FileRecording(Mapping[str, Channel]):
                 f"a sample rate needs a channel of times; {self._source} has {had}; give sample_rate= where it is needed"
             )
         try:
+            _check_no_counts(time)
             period = arguments.sample_period(time.size, t=time)
             for values in self._channels.values():
                 if values.dtype.kind in "iuf" and values.shape == time.shape and not _increases(values):
@@ -300,10 +302,20 @@ def _rate_of(name: str, value: Channel) -> float | None:
     return None
 
 
+def _check_no_counts(time: npt.NDArray[np.float64]) -> None:
+    """Refuse times so large that they count smaller parts of seconds since 1970, as clocks of computers do."""
+    for unit, word, least in _COUNTS:
+        if time[0] >= least:
+            raise ValueError(
+                f"the first, {time[0]:.5g}, would be of the year {time[0] / _YEAR + 1970:.0f} if it were seconds; call the channel "
+                f"'time [{unit}]', or give t= and time_unit='{unit}', if it counts {word} since 1970"
+            )
+
+
 def is_time(name: str, unit: str) -> bool:
     """Return whether a channel of this name, with this unit or none, holds the times of samples."""
     known = unit_of(unit)
-    return _TIME.fullmatch(name) is not None and (
+    return arguments.is_called_time(name) and (
         not unit or (known is not None and known.dimension == ROTARY.dimensions["time"])
     )
 

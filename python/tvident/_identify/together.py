@@ -399,6 +399,11 @@ def sampled(
             raise TypeError("identify needs the sample period; got none; give sample_rate=, delta= or t=")
         implied = times_in_seconds(implied, has_argument=True)
         return arguments.sample_period(samples, t=implied), implied
+    if time_unit is not None and time["sample_rate"] is not None:
+        raise TypeError(
+            f"time_unit is the unit of t and delta; got {arguments.shown(time_unit)} beside sample_rate, which is in Hz; leave it out, or "
+            "give delta= in its place"
+        )
     if time["t"] is not None:
         time["t"] = times_in_seconds(time["t"], time_unit, has_argument=True)
     if time["delta"] is not None and axis.time != 1:

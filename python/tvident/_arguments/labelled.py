@@ -1,0 +1,106 @@
+"""Times that containers say their samples have: dates, durations, and numbers whose unit is said or not."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._arguments.containers import package_of
+from tvident._arguments.times import times_of
+from tvident._units import ROTARY, is_convertible, named_unit, times_in_seconds, unit_said
+
+_OTHER_RATE = 0.1
+"""Times of few digits and gaps move steps by less than this part; a wrong rate is off by more."""
+
+_CALLED = re.compile(
+    r"(t|time|times|zeit|temps|tiempo|tempo|x_value|timestamps?|elapsed( time)?|time_?stamp)([ _.-]?\d+)?",
+    re.IGNORECASE,
+)
+"""What times are called."""
+
+_UNITS = (1.0, 1e-3, 1e-6, 1e-9, 60.0, 3600.0, 86400.0)
+"""Seconds of what times without a unit may be in."""
+
+
+def implied_times(values: Any) -> Any:
+    """Return the times that a container says its samples have: an index of dates or durations; None where it has none.
+
+    Plain numbers are none, since nobody says whether they are seconds. With xarray the attribute ``units`` may say so.
+    """
+    if package_of(values) == "pandas" and hasattr(values, "index"):
+        return values.index if _says_times(values.index) else None
+    if package_of(values) == "xarray" and hasattr(values, "dims"):
+        for dim in values.dims:
+            coordinate = values.coords.get(dim)
+            if coordinate is not None and _says_times(coordinate):
+                return coordinate
+    return None
+
+
+def _says_times(labels: Any) -> bool:
+    """Return whether labels are dates or durations, or numbers in a unit of time."""
+    kind = getattr(getattr(labels, "dtype", None), "kind", "O")
+    if kind in "mM":
+        return True
+    return kind in "iuf" and is_convertible(ROTARY, "time", unit_said(labels))
+
+
+def check_against_labels(values: Any, period: float) -> None:
+    """Refuse a sample period that is another than what a container says its samples have.
+
+    Raises
+    ------
+    ValueError
+        If both the mean and the median step of the labels are far from it.
+    """
+    implied = implied_times(values)
+    if implied is None:
+        _check_against_numbers(values, period)
+    if implied is None or len(implied) < 2:  # noqa: PLR2004 - a step
+        return
+    seconds = np.asarray(times_of(times_in_seconds(implied)), dtype=np.float64)
+    steps = (float(np.median(np.diff(seconds))), float(seconds[-1] - seconds[0]) / (seconds.size - 1))
+    if all(step > 0 and abs(period / step - 1) > _OTHER_RATE for step in steps):
+        raise ValueError(
+            f"the sample period must be that of the times that the samples are labelled with; got {period:.6g} s ({1 / period:.6g} Hz), "
+            f"and labels {steps[0]:.6g} s apart ({1 / steps[0]:.6g} Hz); leave it out, or pass .to_numpy() if the labels are wrong"
+        )
+
+
+def _check_against_numbers(values: Any, period: float) -> None:
+    """Refuse a sample period that labels which are called as times show in no unit; what merely counts samples shows none."""
+    labels = _called_times(values)
+    if labels is None or labels.size < 2 or not np.isfinite(labels).all():  # noqa: PLR2004 - a step
+        return
+    steps = np.diff(labels)
+    usual, mean = float(np.median(steps)), float(labels[-1] - labels[0]) / steps.size
+    if usual <= 0 or (steps == 1).all() or abs(mean / usual - 1) > _OTHER_RATE:
+        return
+    if all(abs(period / (usual * unit) - 1) > _OTHER_RATE for unit in _UNITS):
+        raise ValueError(
+            f"the sample period must be that of the labels of the samples, which are called as times are; got {period:.6g} s "
+            f"({1 / period:.6g} Hz), and labels {usual:.6g} apart ({1 / usual:.6g} Hz if they are seconds); give t= in their place, or "
+            "pass .to_numpy() if the labels are wrong"
+        )
+
+
+def _called_times(values: Any) -> npt.NDArray[np.float64] | None:
+    """Return numbers that label samples and are called as times are, in a unit that nobody says; None where there are none."""
+    found: list[tuple[Any, Any]] = []
+    if package_of(values) == "pandas" and hasattr(values, "index"):
+        found = [(values.index.name, values.index)]
+    elif package_of(values) == "xarray" and hasattr(values, "dims"):
+        found = [(dim, values.coords[dim]) for dim in values.dims if dim in values.coords]
+    for name, labels in found:
+        is_called = isinstance(name, str) and is_called_time(named_unit(name)[0])
+        if is_called and getattr(getattr(labels, "dtype", None), "kind", "O") in "iuf":
+            return np.asarray(labels, dtype=np.float64)
+    return None
+
+
+def is_called_time(name: str) -> bool:
+    """Return whether a name, without its unit, is what times are called."""
+    return _CALLED.fullmatch(name) is not None
