@@ -339,8 +339,8 @@ def test_the_sheet_that_is_read_is_the_recording(tmp_path: Path) -> None:
 
 
 def test_a_sheet_keeps_every_bit(tmp_path: Path) -> None:
-    """openpyxl writes 16 digits; some doubles have 17, and came back one unit in the last place away."""
+    """A sheet has 16 digits from openpyxl; some doubles have 17, and came back one unit in the last place away."""
     numbers = np.random.default_rng(16).standard_normal(2000) * 10.0 ** np.arange(-1000, 1000).clip(-300, 300)
     numbers[3] = np.nan
-    tvident.FileRecording({"x [N m]": numbers}).write(tmp_path / "x.xlsx")
+    tvident.FileRecording({"n": np.arange(2000), "x [N m]": numbers}).write(tmp_path / "x.xlsx")
     np.testing.assert_array_equal(tvident.read_recording(tmp_path / "x.xlsx")["x"], numbers)
