@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from tvident._equation import BUILT_IN
 from tvident._results import Identification, median_of
 from tvident._status import DOUBTFUL_RECORD, Status
@@ -12,8 +14,40 @@ BEYOND_CHANCE = 4.0
 NEXT_TO_NOTHING = 0.01
 """A share of the angle's variance that may stay unexplained whatever else is said."""
 
+NEARLY_ALL = 0.1
+"""What explains nearly all that was left leaves at most this part of it."""
+
 _AGAINST = 0.1
 """A share of a weight that a negative stiffness beside it may have: with more the two are distinguished by nothing."""
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """What to change, in words.
+
+    Parameters
+    ----------
+    ratio : float
+        What it leaves unexplained, beside what the model at hand does.
+    words : str
+    distinguishes : bool
+        All unknowns that there were, and one more, can be distinguished.
+    is_settled : bool
+        Nothing contradicts it.
+    share : float
+        Of what is held back, which it does not predict.
+    """
+
+    ratio: float
+    words: str
+    distinguishes: bool
+    is_settled: bool = False
+    share: float = 0.0
+
+    @property
+    def separates(self) -> bool:
+        """Whether unknowns that cannot be distinguished follow from what is missing: with it they can, and next to nothing is left."""
+        return self.distinguishes and self.ratio <= NEARLY_ALL
 
 
 def are_distinguished(flags: int) -> bool:

@@ -13,7 +13,16 @@ from tvident._arguments import percent, with_error
 from tvident._equation import BUILT_IN, COEFFICIENTS
 from tvident._identify.growths import GROWTHS
 from tvident._identify.left_over import AS_GOOD, Left, Unexplained, unexplained
-from tvident._identify.offered import BEYOND_CHANCE, are_distinguished, can_be, feeds_energy, holds, is_there
+from tvident._identify.offered import (
+    BEYOND_CHANCE,
+    NEARLY_ALL,
+    Remedy,
+    are_distinguished,
+    can_be,
+    feeds_energy,
+    holds,
+    is_there,
+)
 from tvident._results import BECOMES, Identification, median_of
 from tvident._status import DOUBTFUL_RECORD, Status
 
@@ -28,9 +37,6 @@ _BETTER = 0.8
 
 _BETTER_BY_FAR = 0.5
 """The same where nothing contradicts the model at hand: then only a simpler one needs no more than that."""
-
-_NEARLY_ALL = 0.1
-"""What explains nearly all that was left leaves at most this part of it."""
 
 _FAR_SMALLER = 1 / 3
 """What predicts as much is advised where an error falls to this part or below."""
@@ -50,35 +56,6 @@ _CONTRADICTED = _LEFT_OVER | Status.SCALES_DISAGREE | Status.KIND_CONTRADICTED
 """Flags of a record whose model something contradicts."""
 
 Call = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Remedy:
-    """What to change, in words.
-
-    Parameters
-    ----------
-    ratio : float
-        What it leaves unexplained, beside what the model at hand does.
-    words : str
-    distinguishes : bool
-        All unknowns that there were, and one more, can be distinguished.
-    is_settled : bool
-        Nothing contradicts it.
-    share : float
-        Of what is held back, which it does not predict.
-    """
-
-    ratio: float
-    words: str
-    distinguishes: bool
-    is_settled: bool = False
-    share: float = 0.0
-
-    @property
-    def separates(self) -> bool:
-        """Whether unknowns that cannot be distinguished follow from what is missing: with it they can, and next to nothing is left."""
-        return self.distinguishes and self.ratio <= _NEARLY_ALL
 
 
 @dataclass(frozen=True)
@@ -264,7 +241,7 @@ class Trial:
     def _leaves_nothing(self, found: Identification) -> bool:
         """Return whether nothing that an equation mends contradicts a result, and it explains nearly all that was left."""
         contradicted = found.record_status & _CONTRADICTED & ~Status.CHANNEL_SUSPECTED
-        return not contradicted and self._left_of(found).ratio <= _NEARLY_ALL
+        return not contradicted and self._left_of(found).ratio <= NEARLY_ALL
 
     def _tried(self, kinds: Mapping[str, Any], call: Call) -> Identification | None:
         """Return what is found with other terms or another lag; None where that cannot be asked of the record."""
@@ -382,13 +359,29 @@ class Trial:
             changes.append(f"terms={shown}")
         if "lag" in chosen:
             changes.append(f"lag={call['lag']:.4g}")
-        changes += [f"{name}='constant'" for name in changing if is_simple and call[name] == "constant"]
+        if is_simple:
+            changes += [f"{name}='constant'" for name in self._made_constant(changing, kept, call)]
         said = f"{', '.join(words)}: try {', '.join(changes)}; {best}{self._moved(of_best, is_more=bool(chosen))}"
         is_settled = not flags & DOUBTFUL_RECORD if is_simple else self._leaves_nothing(free)
         # With an unknown less the others are told apart whatever the truth is.
         is_more = bool(chosen) and not is_none
         distinguishes = is_more and are_distinguished(flags if is_simple else free.record_status)
         return Remedy(best.ratio, said, distinguishes, is_settled=is_settled, share=best.least.share)
+
+    def _made_constant(self, changing: Sequence[str], kept: Mapping[str, Any], call: Call) -> list[str]:
+        """Return what must be given as constant for the parameters that are told: what changes, and what changes once that may not.
+
+        Of the positioning system EMPS without a stiffness damping takes over what the inertia no longer follows.
+        """
+        names = [name for name in changing if call[name] == "constant"]
+        if not {"inertia", "damping"}.intersection(names):
+            return names
+        advised = self._tried({**kept, **dict.fromkeys(names, "constant")}, call)
+        kinds = {} if advised is None else advised.settings["kinds"]
+        then = [
+            name for name, kind in kinds.items() if kind in {"windowed", "varying"} and call.get(name) == "constant"
+        ]
+        return [name for name in COEFFICIENTS if name in names or name in then]
 
     def _follows_time(self, call: Call, names: Sequence[str]) -> bool:
         """Return whether coefficients that were found to change grow with time beyond chance, along a cubic, where all else is constant.
