@@ -112,7 +112,9 @@ def test_what_would_be_ignored_is_refused() -> None:
     rig = tvident.simulate_torsional_rig(duration=4.0)
     result = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
     # Constants of a part are those of the whole: errors were taken as those of so short a record.
-    with pytest.raises(ValueError, match=r"got a part of .* samples; pass the whole result, or identify the part alone"):
+    with pytest.raises(
+        ValueError, match=r"got a part of .* samples; pass the whole result, or identify the part alone"
+    ):
         tvident.plan_experiment(result=result.between(1, 2))
     with pytest.raises(TypeError, match="got result= and inertia=, band=; leave out one"):
         tvident.plan_experiment(result=result, inertia=0.01, band=(1, 2))

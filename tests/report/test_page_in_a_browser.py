@@ -291,6 +291,25 @@ def test_a_page_of_masses_opens_like_any_other(browser: Any, tmp_path: Path) -> 
     opened.close()
 
 
+@pytest.mark.slow
+def test_a_page_of_a_list_of_records_opens_and_zooms(browser: Any, tmp_path: Path) -> None:
+    rigs = [tvident.simulate_torsional_rig(2.0 + number, seed=number) for number in range(2)]
+    found = tvident.identify([one.angle for one in rigs], [one.torque for one in rigs], sample_rate=1000)
+    found.report(tmp_path / "list.html")
+    opened = Opened(browser, tmp_path / "list.html")
+    assert opened.page.inner_text("#facts") == "2 records of 1.999 to 2.999 s"
+    assert opened.page.inner_text(".verdict p").startswith(
+        "2 records, no reason to distrust any; record 0: K(t) known to"
+    )
+    assert opened.page.inner_text("#charts .group").upper() == "RECORD 0: RECORDED"
+    opened.show(0.5, 0.6)
+    line = opened.drawn("Angle")
+    np.testing.assert_allclose(np.diff(line["x"]), 0.001, rtol=1e-6)
+    assert not opened.words
+    assert opened.requests == [(tmp_path / "list.html").as_uri()]
+    opened.close()
+
+
 def test_a_narrow_screen_needs_no_scrolling_aside_and_night_is_dark(
     browser: Any, short: tuple[Path, tvident.Identification]
 ) -> None:

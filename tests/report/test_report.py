@@ -334,3 +334,64 @@ def test_a_page_speaks_as_whoever_asked_for_it(tmp_path: Path) -> None:
     assert "give angle_unit=" not in typed
     # Beside the advice in the summary, of which the page has two copies.
     assert typed.count("give --angle-unit deg") == python.count("give angle_unit=")
+
+
+def three_records() -> tvident.IdentifiedRecords:
+    """Give three records that share the inertia; the torque of the last one is late, and it begins at another time."""
+    rigs = [tvident.simulate_torsional_rig(2.0 + number, seed=number, pattern="square") for number in range(3)]
+    torques = [rigs[0].torque, rigs[1].torque, np.roll(rigs[2].torque, 8)]
+    found = tvident.identify([one.angle for one in rigs], torques, sample_rate=1000, share=("inertia",))
+    assert isinstance(found, tvident.IdentifiedRecords)
+    return found
+
+
+def test_a_list_of_records_has_one_page(tmp_path: Path) -> None:
+    found = three_records()
+    found.report(tmp_path / "list.html")
+    page = content_of(tmp_path / "list.html")
+    assert re.match(r"1 of 3 records not to be trusted; record 2: do not trust: ", page["verdict"])
+    assert (page["title"], page["tone"], page["span"]) == ("list", "bad", [0.0, 3.999])
+    assert page["facts"] == "3 records of 1.999 to 3.999 s"
+    value, error = found.constants["inertia"]
+    assert page["numbers"][0] == {
+        "name": "Inertia I",
+        "unit": "kg·m²",
+        "value": tvident._arguments.with_error(value, error),  # noqa: SLF001 - as all numbers are written
+        "kind": "shared by 3 records",
+        "more": "",
+    }
+    names = [one["name"] for one in page["numbers"]]
+    assert {f"Record {number}: {name}" for number in range(3) for name in ("Damping C", "Stiffness K")} <= set(names)
+    assert not any(name.endswith(": Inertia I") for name in names)
+    assert any(line.startswith("record 2: the torque is late by ") for line in page["advice"])
+    assert page["summary"] == found.summary()
+    assert any(one["words"].startswith("record 1: near an end of the record") for one in page["warnings"])
+    # Each plot has the series of its record.
+    for number, record in enumerate(found):
+        assert titles(page, f"Record {number}: recorded") == ["Angle", "Torque"]
+        chart = next(
+            one for one in page["charts"] if (one["group"], one["title"]) == (f"Record {number}: found", "Stiffness K")
+        )
+        every = [chart["line"], *chart["band"]]
+        assert {page["series"][one]["name"] for one in every} == {"Stiffness K"}
+        assert {page["series"][one]["count"] for one in every} == {record.time.size}
+        strips = next(one for one in page["charts"] if one["group"] == f"Record {number}: how well" and "strips" in one)
+        assert all(page["series"][one["series"]]["name"] == one["flag"] for one in strips["strips"])
+    rest: Any = found
+    with pytest.raises(ValueError, match=r"must end in \.html; got '.*x\.txt'"):
+        rest.report(tmp_path / "x.txt")
+    with pytest.raises(ValueError, match=r"shows 1 to 24 records; got 0; take some of them: result\[:24\]"):
+        rest[3:].report(tmp_path / "x.html")
+
+
+def test_records_that_begin_at_different_times_lie_beside_each_other(tmp_path: Path) -> None:
+    rig = tvident.simulate_torsional_rig(3.0, pattern="square")
+    found = [
+        tvident.identify(rig.angle, rig.torque, t=begin + np.arange(rig.angle.size) / 1000) for begin in (0.0, 1.7e9)
+    ]
+    tvident.IdentifiedRecords(found).report(tmp_path / "list.html", title="both")
+    page = content_of(tmp_path / "list.html")
+    assert page["span"] == [0.0, pytest.approx(2.999)]
+    assert page["facts"].endswith("times of the plots count from the beginning of each")
+    assert {one["start"] for one in page["series"]} == {0.0}
+    assert all(0 <= time <= 3 for one in page["warnings"] for times in one["times"] for time in times)

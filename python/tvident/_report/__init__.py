@@ -3,13 +3,16 @@
 from tvident._report.channels import check_page, names_of_channels, samples_shown, series_of, write_page
 from tvident._report.content import Compared, Curve, ShownResult, title_of, unit_of
 from tvident._report.packed import Series
-from tvident._report.written import check_plotly
+from tvident._report.several import ShownList, check_count
+from tvident._report.written import check_plotly, write_list
 
 __all__ = [
     "Compared",
     "Curve",
     "Series",
+    "ShownList",
     "ShownResult",
+    "check_count",
     "check_page",
     "check_plotly",
     "names_of_channels",
@@ -17,5 +20,6 @@ __all__ = [
     "series_of",
     "title_of",
     "unit_of",
+    "write_list",
     "write_page",
 ]

@@ -258,7 +258,7 @@
     byId("verdict").classList.add(content.tone);
     byId("sign").textContent = { good: "✓", doubtful: "!", bad: "✕" }[content.tone];
     const first = content.series[0];
-    if (first) byId("facts").textContent = `${first.count.toLocaleString("en").replaceAll(",", "\u202f")} samples, ${Number((END - START).toPrecision(4))} s`;
+    if (first) byId("facts").textContent = content.facts ?? `${first.count.toLocaleString("en").replaceAll(",", "\u202f")} samples, ${Number((END - START).toPrecision(4))} s`;
     for (const one of content.numbers) {
       const card = element("div", undefined, "number");
       const [middle, error] = one.value.split(" ± ");

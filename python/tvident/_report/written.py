@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from importlib.resources import files
@@ -15,6 +16,7 @@ from typing import Any
 from tvident._files import printable, replaced
 from tvident._report.content import ShownResult, content_of
 from tvident._report.packed import Packed, Series, in_words, packed, text_of
+from tvident._report.several import ShownList, content_of_list
 
 _LONGEST_TITLE = 200
 
@@ -40,10 +42,19 @@ def _plotly(place: Path) -> str:
 
 def write_report(path: str | Path, shown: ShownResult, recorded: list[Series], title: str) -> None:
     """Write a page that shows a result, its channels, and recorded and predicted torque; it appears whole or not at all."""
+    _write(path, lambda shortened: content_of(shown, recorded, shortened), title)
+
+
+def write_list(path: str | Path, shown: ShownList, title: str | None) -> None:
+    """Write a page that shows several records, one after the other."""
+    _write(path, lambda shortened: content_of_list(shown, shortened), title or Path(path).stem)
+
+
+def _write(path: str | Path, content_in: Callable[[str], tuple[dict[str, Any], list[Series]]], title: str) -> None:
     place = check_plotly()
     with ThreadPoolExecutor(1) as beside:
         plotly = beside.submit(_plotly, place)
-        content, series = content_of(shown, recorded, printable(title, _LONGEST_TITLE))
+        content, series = content_in(printable(title, _LONGEST_TITLE))
         parts = packed(series)
         pieces = _pieces(content, parts, plotly.result())
     with replaced(Path(path)) as file:

@@ -259,6 +259,37 @@ class IdentifiedRecords(TabularList, Sequence[Identification]):
         told = None if shared is None else {**vars(shared), "covariance": shared.covariance.tolist()}
         store_list(place, self._records, told)
 
+    def report(self, path: str | Path, *, title: str | None = None) -> None:
+        """Write a report of all records: one page that opens in a browser without a network.
+
+        It begins with what is shared; each record follows with its parameters and its plots, which are zoomed together.
+
+        Parameters
+        ----------
+        path : str or Path
+            A name that ends in ``.html``. The file appears whole or not at all.
+        title : str, optional
+            By default the name of the file.
+
+        Raises
+        ------
+        ImportError
+            If plotly is missing: install ``tvident[report]``.
+        ValueError
+            If the ending is another one, or there are more than 24 records: ``result[:24]`` are some.
+        OSError
+            If there is no such folder, or the file cannot be written.
+
+        See Also
+        --------
+        summary : its words.
+        Identification.report : of one record, with channels of your own.
+        """
+        from tvident._results.reported import report_list  # noqa: PLC0415 - pages are rarely asked for, and take long to load
+
+        words = self.summary()
+        report_list(self._records, path, shared=self.constants, advice=self.advice, summary=words, title=title)
+
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or not self._records or not hasattr(self._records[0], name):
             raise AttributeError(f"'{type(self).__name__}' object has no attribute {name!r}")

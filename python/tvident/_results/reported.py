@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy.typing as npt
 
+from tvident import _arguments as arguments
 from tvident import _report
 from tvident._equation import COEFFICIENTS
 from tvident._results.recorded import Recorded
@@ -35,6 +36,32 @@ def report(
         raise ValueError(
             f"only a single record has a report; this one has shape {result.inertia.shape}; take one record"
         )
+    page, shown = _shown(result, recorded, said)
+    _report.write_page(path, page, shown, channels, title)
+
+
+def report_list(
+    records: Sequence[Any],
+    path: str | Path,
+    *,
+    shared: Mapping[str, tuple[float, float]],
+    advice: Sequence[str],
+    summary: str,
+    title: str | None,
+) -> None:
+    """Write one report of several records that were identified together."""
+    _report.check_page(path)
+    _report.check_count(len(records))
+    if not isinstance(title, str | None):
+        raise TypeError(f"title must be text; got {arguments.shown(title)}; write it in quotes")
+    shown = [_shown(record, record._recorded, str) for record in records]  # noqa: SLF001 - of this room
+    _report.write_list(path, _report.ShownList(shown, shared, advice, summary), title)
+
+
+def _shown(
+    result: Any, recorded: Recorded | None, said: Callable[[str], str]
+) -> tuple[_report.ShownResult, list[_report.Series]]:
+    """Return what a page shows of a result, and the channels that are there."""
     shown: list[_report.Series] = []
     compared: list[_report.Compared] = []
     share = None
@@ -68,7 +95,7 @@ def report(
         summary=lambda: summary_of(result, share),
         said=said,
     )
-    _report.write_page(path, page, shown, channels, title)
+    return page, shown
 
 
 def _settings(s: Mapping[str, Any], units: Mapping[str, str]) -> list[Row]:
