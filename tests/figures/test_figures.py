@@ -151,6 +151,11 @@ def test_a_file_is_drawn_with_its_units(rig: tvident.Recording) -> None:
     assert np.asarray(drawn.get_lines()[0].get_xdata(), float)[-1] == pytest.approx(rig.time[-1])
     with pytest.raises(ValueError, match="a recording needs its time; got sample_rate=None; give sample_rate="):
         figures.plot_recording({"angle": rig.angle})
+    # Times are found by what they are called, as in files.
+    for name in ("t [s]", "t", "Zeit [ms]", "timestamp"):
+        (drawn,) = figures.plot_recording({name: np.arange(rig.angle.size), "angle [rad]": rig.angle}).axes
+        assert np.asarray(drawn.lines[0].get_xdata())[-1] == (rig.angle.size - 1) * (1e-3 if "ms" in name else 1)
+        assert drawn.get_title(loc="left") + drawn.get_title() == "Angle"
 
 
 @pytest.mark.slow

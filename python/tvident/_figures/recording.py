@@ -10,9 +10,10 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from tvident import _arguments as arguments
 from tvident._figures.style import FOUND, MUTED, Place, draw_line, panels, plain, style
 from tvident._simulate import Recording
-from tvident._units import Channel, named_unit, times_in_seconds, unit_said, with_unit
+from tvident._units import ROTARY, Channel, is_convertible, named_unit, times_in_seconds, unit_said, with_unit
 
 
 def plot_recording(
@@ -26,7 +27,7 @@ def plot_recording(
     ----------
     recording : Recording or mapping of str to array_like, shape (n,)
         From :func:`tvident.simulate_torsional_rig` or :func:`tvident.read_recording`, or channels by name; a unit may follow the name in
-        brackets, and a channel ``time`` says when.
+        brackets, and a channel ``time``, ``t`` or the like says when.
     sample_rate : float, optional
         Samples per second of channels without time.
     ax : Axes or sequence of Axes, optional
@@ -84,9 +85,14 @@ def plot_recording(
         return figure
 
 
+def _is_time(name: str, unit: str) -> bool:
+    """Return whether a channel is called as times are, in a unit of time or none."""
+    return arguments.is_called_time(name.strip()) and (not unit or is_convertible(ROTARY, "time", unit))
+
+
 def _time(channels: dict[str, npt.NDArray[Any]], sample_rate: float | None) -> npt.NDArray[np.float64]:
     """Take the time out of channels, or make it."""
-    named = [name for name in channels if named_unit(name)[0].strip().lower() == "time"]
+    named = [name for name in channels if _is_time(*named_unit(name))]
     time = None
     if named:
         time = np.asarray(times_in_seconds(Channel(channels.pop(named[0]), named_unit(named[0])[1])))
