@@ -38,6 +38,9 @@ _BETTER = 0.8
 _BETTER_BY_FAR = 0.5
 """The same where nothing contradicts the model at hand: then only a simpler one needs no more than that."""
 
+_ENOUGH = 0.2
+"""So much may be left by what nothing contradicts for no other suspect to be tried: each takes as long as to identify a part."""
+
 _FAR_SMALLER = 1 / 3
 """What predicts as much is advised where an error falls to this part or below."""
 
@@ -234,14 +237,14 @@ class Trial:
             found = self._tried(kinds, self._with(call, one))
             if found is not None:
                 tried[one] = found
-                if self._leaves_nothing(found) and self._may_be(one, found):
+                if self._leaves_nothing(found, _ENOUGH) and self._may_be(one, found):
                     break
         return tried
 
-    def _leaves_nothing(self, found: Identification) -> bool:
-        """Return whether nothing that an equation mends contradicts a result, and it explains nearly all that was left."""
+    def _leaves_nothing(self, found: Identification, most: float = NEARLY_ALL) -> bool:
+        """Return whether nothing that an equation mends contradicts a result, and it leaves at most so much of what was left."""
         contradicted = found.record_status & _CONTRADICTED & ~Status.CHANNEL_SUSPECTED
-        return not contradicted and self._left_of(found).ratio <= NEARLY_ALL
+        return not contradicted and self._left_of(found).ratio <= most
 
     def _tried(self, kinds: Mapping[str, Any], call: Call) -> Identification | None:
         """Return what is found with other terms or another lag; None where that cannot be asked of the record."""
