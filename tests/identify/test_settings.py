@@ -214,6 +214,14 @@ def test_an_option_that_there_is_not_is_told_what_is_right(options: dict[str, An
         tvident.identify(np.zeros(100), np.zeros(100), **options)
 
 
+def test_what_has_no_name_is_told_that_it_needs_one() -> None:
+    """It heard "takes 2 positional arguments but 3 were given"."""
+    identify: Any = tvident.identify
+    words = "identify takes everything but angle and torque by name; got 1000 without one; write sample_rate= in front of it"
+    with pytest.raises(TypeError, match=re.escape(words)):
+        identify(np.zeros(100), np.zeros(100), 1000)
+
+
 @pytest.mark.parametrize(
     ("form", "options", "words"),
     [

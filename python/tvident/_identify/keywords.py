@@ -37,10 +37,20 @@ def explained_form(form: _Form) -> _Form:
 
 def explained(function: _Function, called: str = "identify") -> _Function:
     """Return the function; an option that it does not have is an error that says what would be right."""
-    known = frozenset(signature(function).parameters) - {"self"}
+    parameters = signature(function).parameters
+    known = frozenset(parameters) - {"self"}
+    in_order = [
+        name for name, one in parameters.items() if one.kind in {one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD}
+    ]
 
     @wraps(function)
     def call(*args: Any, **options: Any) -> Any:
+        # Forms take settings in order; nothing but the data of a record has one.
+        if len(args) > len(in_order) and "sample_rate" in known:
+            raise TypeError(
+                f"{called} takes everything but {' and '.join(in_order)} by name; got {arguments.shown(args[len(in_order)])} without one; "
+                "write sample_rate= in front of it"
+            )
         if not known.issuperset(options):
             name = next(name for name in options if name not in known)
             raise TypeError(f"{called} has no option {arguments.shown(name)}; {_right(name, known)}")
