@@ -329,29 +329,32 @@ fn misfit(measured: &Statistic, noises: &[usize], amounts: &[f64]) -> f64 {
 
 /// The amounts, none below zero, of least squared misfit, and that misfit: by active sets (Lawson and Hanson 1974, chapter 23).
 fn fit(measured: &[Statistic], noises: &[usize]) -> (f64, Vec<f64>) {
-    let row = |one: &Statistic| -> Vec<f64> {
-        noises.iter().map(|&noise| one.of_noises[noise] / one.power / one.deviation).collect()
-    };
-    let rows: Vec<Vec<f64>> = measured.iter().map(row).collect();
-    let sum = |term: &dyn Fn(&[f64], &Statistic) -> f64| {
-        rows.iter().zip(measured).map(|(row, one)| term(row, one)).sum::<f64>()
-    };
     let count = noises.len();
-    let normal = Mat::from_fn(count, count, |i, j| sum(&|row, _| row[i] * row[j]));
-    let right: Vec<f64> = (0..count).map(|i| sum(&|row, one| row[i] / one.deviation)).collect();
+    let column = |&noise: &usize| measured.iter().map(move |one| one.of_noises[noise] / one.power / one.deviation);
+    let numbers: Vec<f64> = noises.iter().flat_map(column).collect();
+    let column = |i: usize| &numbers[i * measured.len()..(i + 1) * measured.len()];
+    let product = |i: usize, j: usize| column(i).iter().zip(column(j)).map(|(a, b)| a * b).sum::<f64>();
+    let right = |i: usize| column(i).iter().zip(measured).map(|(a, one)| a / one.deviation).sum::<f64>();
+    let right: Vec<f64> = (0..count).map(right).collect();
+    // In the unit of what is measured: noises of different memory are of different size.
+    let sizes: Vec<f64> = (0..count).map(|i| product(i, i).sqrt()).collect();
     let (mut amounts, mut free) = (vec![0.0; count], Vec::new());
+    // The products of all noises with those that were free: few are.
+    let mut normal: Vec<Vec<f64>> = vec![Vec::new(); count];
     for _ in 0..ROUNDS {
-        // In the unit of what is measured: noises of different memory are of different size.
         let gain = |i: usize| {
-            let known: f64 = free.iter().map(|&j: &usize| normal[(i, j)] * amounts[j]).sum();
-            (right[i] - known) / normal[(i, i)].sqrt()
+            let known: f64 = free.iter().map(|&j: &usize| normal[j][i] * amounts[j]).sum();
+            (right[i] - known) / sizes[i]
         };
         let held = (0..count).filter(|i| !free.contains(i)).map(|i| (i, gain(i)));
         let best = held.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|&(_, gain)| gain > CHANGE);
         let Some((next, _)) = best else { break };
         free.push(next);
+        if normal[next].is_empty() {
+            normal[next] = (0..count).map(|i| product(i, next)).collect();
+        }
         while !free.is_empty() {
-            let part = Mat::from_fn(free.len(), free.len(), |i, j| normal[(free[i], free[j])]);
+            let part = Mat::from_fn(free.len(), free.len(), |i, j| normal[free[j]][free[i]]);
             let Ok(factor) = Llt::new(part.as_ref(), Side::Lower) else {
                 // Two noises that cannot be told apart here.
                 return (squared_misfit(measured, noises, &amounts), amounts);
@@ -375,4 +378,40 @@ fn fit(measured: &[Statistic], noises: &[usize]) -> (f64, Vec<f64>) {
 
 fn squared_misfit(measured: &[Statistic], noises: &[usize], amounts: &[f64]) -> f64 {
     measured.iter().map(|one| misfit(one, noises, amounts).powi(2)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::quantisation::tests::uniform;
+
+    #[test]
+    fn no_subset_of_the_noises_fits_better() {
+        let mut last = 0.0;
+        let first_order = |e: f64| {
+            last = 0.8 * last + e;
+            last
+        };
+        let record: Vec<f64> = uniform(8000).into_iter().map(first_order).collect();
+        let measured = measure(&record.as_slice(), 0.1, Instructions::current()).expect("coloured noise");
+        let noises = [0, 1, 2, 3, 5, 9];
+        let (least, amounts) = fit(&measured, &noises);
+        assert!(amounts.iter().all(|&amount| amount >= 0.0) && amounts.contains(&0.0), "{amounts:?}");
+        let misfit_of = |subset: usize| {
+            let some: Vec<usize> = (0..noises.len()).filter(|place| subset >> place & 1 == 1).collect();
+            let of = |one: &Statistic, place: usize| one.of_noises[noises[place]] / one.power / one.deviation;
+            let columns = Mat::from_fn(measured.len(), some.len(), |i, j| of(&measured[i], some[j]));
+            let right = Mat::from_fn(measured.len(), 1, |i, _| 1.0 / measured[i].deviation);
+            let factor = Llt::new((columns.transpose() * &columns).as_ref(), Side::Lower).ok()?;
+            let solved = factor.solve(columns.transpose() * &right);
+            let mut amounts = vec![0.0; noises.len()];
+            for (row, &place) in some.iter().enumerate() {
+                amounts[place] = solved[(row, 0)];
+            }
+            let possible = amounts.iter().all(|&amount| amount >= 0.0);
+            possible.then(|| squared_misfit(&measured, &noises, &amounts))
+        };
+        let best = (1..1 << noises.len()).filter_map(misfit_of).fold(f64::INFINITY, f64::min);
+        assert!((least / best - 1.0).abs() < 1e-6, "{least} {best}");
+    }
 }

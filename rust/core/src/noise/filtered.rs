@@ -14,9 +14,10 @@
 //! The noise must be seen an octave below the corner. Where no motion rises from it, a motion of limited band looks the same: then the corner must be
 //! higher than a motion's would be whose derivatives are worth asking for.
 
+use std::cell::LazyCell;
 use std::f64::consts::{LN_2, PI};
 use std::ops::RangeInclusive;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::local_polynomials::basis::Basis;
 use crate::local_polynomials::tables::Kept;
@@ -59,10 +60,15 @@ type Spectra = Arc<[Vec<f64>]>;
 /// What windows take of every noise, behind every filter.
 type BehindAll = Arc<[Arc<[f64]>]>;
 
-/// Spectra by half-width and first degree; of short windows what they take behind every filter is kept instead, and counts as so large.
+/// The same where only some filters are asked for.
+type BehindSome = Arc<[OnceLock<Arc<[f64]>>]>;
+
+/// By half-width and first degree: spectra, what short windows take behind every filter, and what long ones take behind those that came near. What
+/// filters leave counts as so large.
 static SPECTRA: Kept<(usize, usize), Spectra> = Kept::new();
 static BEHIND: Kept<(usize, usize), BehindAll> = Kept::new();
-const FILTERS_OF_SHORT: usize = 400;
+static BEHIND_NEAR: Kept<(usize, usize), BehindSome> = Kept::new();
+const FILTERS: usize = 400;
 
 /// A filter that passes low frequencies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -142,7 +148,7 @@ pub fn coloured_or_low_passed_noise(
 /// The noise that explains what is measured of so many samples behind a filter, or `None`.
 fn low_passed(measured: &[Statistic], samples: usize) -> Option<CorrelatedNoise> {
     let (short, long) = measured.split_at_checked(FEWEST)?;
-    let kept = |one: &Statistic| BEHIND.try_get(one.key(), FILTERS_OF_SHORT, || behind_all(one).ok_or(()));
+    let kept = |one: &Statistic| BEHIND.try_get(one.key(), FILTERS, || behind_all(one).ok_or(()));
     let short_behind: Vec<BehindAll> = short.iter().map(kept).collect::<Result<_, ()>>().ok()?;
     let beside = |place: usize| short.iter().zip(&short_behind).map(move |(one, all)| one.beside(all[place].clone()));
     let mut filters: Vec<_> = LowPass::all().enumerate().map(|(place, filter)| (place, filter, 0.0)).collect();
@@ -153,9 +159,14 @@ fn low_passed(measured: &[Statistic], samples: usize) -> Option<CorrelatedNoise>
     let spectra_of = |one: &Statistic| SPECTRA.try_get(one.key(), one.half, || spectra(one).ok_or(()));
     let of_long: Vec<Spectra> = long.iter().map(spectra_of).collect::<Result<_, ()>>().ok()?;
     let longest = of_long.iter().map(|spectra| spectra[0].len()).max().unwrap_or(1);
+    let none = || (0..filters.len()).map(|_| OnceLock::new()).collect();
+    let kept = |one: &Statistic| BEHIND_NEAR.get(one.key(), FILTERS, none);
+    let long_behind: Vec<BehindSome> = long.iter().map(kept).collect();
     let judged = |&(place, filter, _): &(usize, LowPass, f64)| {
-        let gains = filter.gains(longest);
-        let behind = long.iter().zip(&of_long).map(|(one, spectra)| one.beside(behind(spectra, &gains)));
+        let gains = LazyCell::new(|| filter.gains(longest));
+        let of =
+            |(spectra, some): (&Spectra, &BehindSome)| Arc::clone(some[place].get_or_init(|| behind(spectra, &gains)));
+        let behind = long.iter().zip(of_long.iter().zip(&long_behind).map(of)).map(|(one, of)| one.beside(of));
         let statistics: Vec<Statistic> = beside(place).chain(behind).collect();
         let explained = explained(&statistics)?;
         let missed = missed(&statistics[..explained]);
@@ -207,4 +218,41 @@ fn spectra(of: &Statistic) -> Option<Spectra> {
     };
     let octaves: Vec<Vec<f64>> = corners().map(of_octave).collect();
     Some(std::iter::once(white).chain(octaves).collect::<Vec<_>>().into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::quantisation::tests::uniform;
+
+    /// Means of neighbours, rough enough to be noise and too smooth to be a sum of first-order noises.
+    fn smoothed(samples: usize, first: usize) -> Vec<f64> {
+        uniform(samples + first + 2)[first..].windows(3).map(|three| three.iter().sum::<f64>()).collect()
+    }
+
+    #[test]
+    fn what_is_kept_of_a_filter_is_what_gains_at_more_frequencies_give() {
+        let of = measure(&smoothed(4000, 0).as_slice(), 0.1, Instructions::current()).expect("noise");
+        let spectra = spectra(&of[FEWEST]).expect("little memory");
+        let frequencies = spectra[0].len();
+        for filter in LowPass::all().step_by(7) {
+            let own = behind(&spectra, &filter.gains(frequencies));
+            for times in [2, 8] {
+                assert_eq!(own, behind(&spectra, &filter.gains(times * (frequencies - 1) + 1)), "{filter:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_second_call_finds_the_noise_of_the_first() {
+        let found = |first: usize| {
+            let noise = coloured_or_low_passed_noise(&smoothed(4000, first).as_slice(), 0.1, Instructions::current());
+            assert!(!noise.is_white());
+            format!("{noise:?}")
+        };
+        let first = found(0);
+        // Other noise keeps other filters.
+        assert_ne!(found(100), first);
+        assert_eq!(found(0), first);
+    }
 }
