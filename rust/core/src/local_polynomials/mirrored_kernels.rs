@@ -237,9 +237,10 @@ impl PairSum<'_, '_> {
             let mut references = [sign; VECTORS];
             unroll!(V < VECTORS, { references[V] = simd.load(samples, centre + first + V * lanes) });
             let mut sums = [[sign; VECTORS]; WIDTH];
-            for (sums, &constant) in sums.iter_mut().zip(&group.constants) {
-                unroll!(V < VECTORS, { sums[V] = simd.mul_f64s(simd.splat_f64s(constant), references[V]) });
-            }
+            unroll!(W < WIDTH, {
+                let constant = simd.splat_f64s(group.constants[W % MOST_KERNELS]);
+                unroll!(V < VECTORS, { sums[W][V] = simd.mul_f64s(constant, references[V]) });
+            });
             for (&(right, left), weights) in pairs.iter().zip(weights) {
                 let mut pair = [sign; VECTORS];
                 unroll!(V < VECTORS, {
@@ -253,20 +254,28 @@ impl PairSum<'_, '_> {
                     unroll!(V < VECTORS, { sums[W][V] = simd.mul_add_f64s(weight, pair[V], sums[W][V]) });
                 });
             }
-            for (sums, &row) in sums.iter().zip(&group.rows) {
-                // A row that is not wanted is empty.
-                let Some(row) = rows[row].get_mut(some.start + first..some.end) else { continue };
-                for (part, &sum) in row.chunks_mut(lanes).zip(sums) {
-                    if part.len() == lanes {
-                        simd.store(part, 0, sum);
-                    } else {
-                        let mut values = [0.0; MOST_LANES];
-                        simd.store(&mut values, 0, sum);
-                        part.copy_from_slice(&values[..part.len()]);
+            // A row that is not wanted is empty. Written out: sums that a loop goes through would be kept in memory.
+            unroll!(W < WIDTH, {
+                let row = group.rows.get(W).and_then(|&row| rows[row].get_mut(some.start + first..some.end));
+                match row {
+                    Some(row) if row.len() >= VECTORS * lanes => {
+                        unroll!(V < VECTORS, { simd.store(row, V * lanes, sums[W][V]) });
                     }
+                    Some(row) => store_some(simd, row, sums[W]),
+                    None => {}
                 }
-            }
+            });
         }
+    }
+}
+
+/// Writes the numbers of some vectors, as many as there is room for.
+#[inline(always)]
+fn store_some<S: Lanes, const VECTORS: usize>(simd: S, row: &mut [f64], vectors: [S::f64s; VECTORS]) {
+    for (part, vector) in row.chunks_mut(S::F64_LANES).zip(vectors) {
+        let mut values = [0.0; MOST_LANES];
+        simd.store(&mut values, 0, vector);
+        part.copy_from_slice(&values[..part.len()]);
     }
 }
 
