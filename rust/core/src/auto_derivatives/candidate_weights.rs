@@ -10,6 +10,7 @@ use crate::auto_derivatives::survey::CLOSELY;
 use crate::auto_derivatives::symmetric_grid::Blocks;
 use crate::error::Error;
 use crate::local_polynomials::coefficients::{CoefficientScratch, Projected};
+use crate::simd::f64x8::WIDTH;
 use crate::simd::instructions::Instructions;
 use crate::simd::vectors::dispatch;
 
@@ -207,6 +208,11 @@ impl Refinement {
         }
     }
 
+    /// Numbers of a block, one for every candidate and some more to fill whole vectors.
+    pub(crate) fn stride(&self) -> usize {
+        self.offsets.len().next_multiple_of(WIDTH)
+    }
+
     /// Whether candidates are compared at every sample: then neighbourhoods are short beside pieces, and what is compared is what is averaged.
     pub(crate) fn at_every_sample(&self) -> bool {
         self.banks.iter().all(|bank| self.step(bank) == 1)
@@ -261,7 +267,7 @@ impl Refinement {
                 dispatch(self.instructions, differences);
                 for ((block, part), squares) in blocks_here.zip(&*parts).zip(squares.chunks_exact(rows.len())) {
                     let from = block - blocks.start;
-                    let sums = &mut sums[from * self.offsets.len() + column..];
+                    let sums = &mut sums[from * self.stride() + column..];
                     let mut count = part.len() as f64;
                     for ((row, &square), sum) in rows.iter().zip(squares).zip(sums) {
                         // NaN of a bank is NaN of all its rows.
@@ -340,7 +346,7 @@ mod tests {
             let of = Refinement::new(samples, Pair { half: 100, order: derivative + 2 }, &target);
             let of = of.expect("little memory").expect("long enough");
             let (mut sums, mut counts) =
-                (vec![0.0; of.blocks.count() * of.offsets.len()], vec![0.0; of.blocks.count() * of.banks.len()]);
+                (vec![0.0; of.blocks.count() * of.stride()], vec![0.0; of.blocks.count() * of.banks.len()]);
             of.compare(&means, 0..of.blocks.count(), &mut sums, &mut counts, &mut of.scratch());
             let mut column = 0;
             for (index, bank) in of.banks.iter().enumerate() {
@@ -358,7 +364,7 @@ mod tests {
                 for row in rows {
                     let compare = &compare[0];
                     let (all, of_all) = known_squared_distance(row, compare, &(0..row.len()));
-                    let few: f64 = sums[column..].iter().step_by(of.offsets.len()).sum();
+                    let few: f64 = sums[column..].iter().step_by(of.stride()).sum();
                     let ratio = few / count / (all / of_all);
                     // As much as a mean square over so many places scatters if no place tells of another.
                     let chance = 3.5 * (2.0 / count).sqrt();

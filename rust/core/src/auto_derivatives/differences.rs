@@ -23,16 +23,32 @@ impl Kernel for SquaredDifferences<'_> {
         sums.clear();
         sums.resize(parts.len() * rows.len(), 0.0);
         // Plain loops: what extends a vector would be compiled by itself, without the instructions of the kernel.
+        let mut known = compare.len();
+        for row in rows {
+            known = known.min(row.len());
+        }
+        // The bits of the lanes within a part: most parts are of one length.
+        let (mut count, mut within) = (0, [0_u64; WIDTH]);
         for (part, sums) in parts.iter().zip(sums.chunks_exact_mut(rows.len().max(1))) {
-            let short = part.len() <= WIDTH && part.start + WIDTH <= compare.len();
-            let compare_at = if short { Packet::load(&compare[part.start..]) } else { Packet::ZERO };
+            if part.len() > WIDTH || part.start + WIDTH > known {
+                for (row, sum) in rows.iter().zip(sums) {
+                    *sum = squared_distance(row, compare, part);
+                }
+                continue;
+            }
+            if part.len() != count {
+                count = part.len();
+                for (lane, within) in within.iter_mut().enumerate() {
+                    *within = if lane < count { u64::MAX } else { 0 };
+                }
+            }
+            let compare_at = Packet::load(&compare[part.start..]);
             for (row, sum) in rows.iter().zip(sums) {
-                *sum = if short && part.start + WIDTH <= row.len() {
-                    let differences = Packet::load(&row[part.start..]) - compare_at;
-                    total(squares_of(differences, part.len()))
-                } else {
-                    squared_distance(row, compare, part)
-                };
+                let mut differences = Packet::load(&row[part.start..]) - compare_at;
+                for (difference, within) in differences.0.iter_mut().zip(&within) {
+                    *difference = f64::from_bits(difference.to_bits() & within);
+                }
+                *sum = total(differences * differences);
             }
         }
     }

@@ -24,6 +24,7 @@ use std::num::NonZeroUsize;
 use std::ops::Range;
 
 use crate::auto_derivatives::block_means::{BlockMeans, Grid};
+use crate::auto_derivatives::block_weights::BlockWeights;
 use crate::auto_derivatives::candidate_weights::{AverageScratch, Refinement};
 use crate::auto_derivatives::interpolated_average::{POINTS, fill_between};
 use crate::auto_derivatives::local_weights::{DerivativeOutputs, LocalWeights, Weighed};
@@ -32,52 +33,6 @@ use crate::error::Error;
 use crate::exec::pool::{self, Piece, Watch};
 use crate::lanes::output::split_off;
 use crate::simd::vectors::dispatch;
-
-/// Candidates of less weight are left out, unless they add more than that to the variance: a window of an eighth has the weight of a millionth where
-/// its variance is as much larger.
-const NEGLIGIBLE: f64 = 1e-5;
-const NEGLIGIBLE_VARIANCE: f64 = 1e-3;
-
-/// The logarithm of a weight that is left out whatever it adds to the variance, and of one that is where its variance is at most so many times
-/// that of the best: most candidates need no exponential function.
-const NOTHING: f64 = -46.0;
-const LITTLE: f64 = -11.6;
-const MANY_TIMES: f64 = 100.0;
-
-/// Turns logarithms of weights, of which the largest is zero, into weights, and lists the candidates that may have any. Where all are left out there is
-/// nothing to average.
-fn normalise(weights: &mut [f64], variances: &[f64], counted: &mut Vec<usize>) {
-    // The last of the best: all others are below zero, or the negative zero.
-    let mut variance = 0.0;
-    for (weight, own) in weights.iter().zip(variances) {
-        variance = if weight.to_bits() == 0 { *own } else { variance };
-    }
-    // Nothing is decided before all are looked at: which candidates count changes from block to block.
-    counted.resize(weights.len(), 0);
-    let mut count = 0;
-    for (candidate, (weight, own)) in weights.iter_mut().zip(variances).enumerate() {
-        let counts = *weight > if *own > MANY_TIMES * variance { NOTHING } else { LITTLE };
-        *weight = if counts { *weight } else { 0.0 };
-        counted[count] = candidate;
-        count += usize::from(counts);
-    }
-    counted.truncate(count);
-    let mut total = 0.0;
-    for &candidate in &*counted {
-        weights[candidate] = weights[candidate].exp();
-        total += weights[candidate];
-    }
-    let mut kept = 0.0;
-    for &candidate in &*counted {
-        let share = weights[candidate] / total;
-        let counts = share > NEGLIGIBLE || share * variances[candidate] > NEGLIGIBLE_VARIANCE * variance;
-        weights[candidate] = if counts { share } else { 0.0 };
-        kept += weights[candidate];
-    }
-    for &candidate in &*counted {
-        weights[candidate] /= kept;
-    }
-}
 
 impl Refinement {
     /// Estimates wherever a window of any candidate lies in the record; NaN elsewhere.
@@ -136,7 +91,7 @@ impl Refinement {
     fn weigh_alone(&self, means: &BlockMeans<'_>, blocks: &Range<usize>, scratch: &mut AverageScratch) -> Weighed {
         let around = self.blocks_around(blocks, self.blocks_beside());
         let known = self.blocks_around(&around, self.reach());
-        let mut sums = vec![0.0; known.len() * self.offsets.len()];
+        let mut sums = vec![0.0; known.len() * self.stride()];
         let mut counts = vec![0.0; known.len() * self.banks.len()];
         self.compare(means, known.clone(), &mut sums, &mut counts, scratch);
         self.weigh(around, known.start, &sums, &counts)
@@ -150,15 +105,14 @@ impl Refinement {
         workers: NonZeroUsize,
         watch: &mut Watch<'_>,
     ) -> Result<Weighed, Error> {
-        let candidates = self.offsets.len();
         let around = self.blocks_around(chunk, self.blocks_beside());
         let known = self.blocks_around(&around, self.reach());
-        let mut sums = vec![0.0; known.len() * candidates];
+        let mut sums = vec![0.0; known.len() * self.stride()];
         let mut counts = vec![0.0; known.len() * self.banks.len()];
         let (mut all, mut all_counts) = (sums.as_mut_slice(), counts.as_mut_slice());
         let mut pieces = Vec::new();
         for part in self.pieces(&known) {
-            let own = split_off(&mut all, part.len() * candidates);
+            let own = split_off(&mut all, part.len() * self.stride());
             let own_counts = split_off(&mut all_counts, part.len() * self.banks.len());
             pieces.push(Piece { size: self.samples(&part).len(), content: (part, own, own_counts) });
         }
@@ -178,19 +132,18 @@ impl Refinement {
         outputs: &mut DerivativeOutputs<'_>,
         scratch: &mut AverageScratch,
     ) {
-        let (samples, candidates) = (self.samples(&blocks), self.offsets.len());
+        let (samples, stride) = (self.samples(&blocks), self.stride());
         // Weights are linear between the centres of neighbouring blocks.
         let around = self.blocks_around(&blocks, self.blocks_beside());
-        let part = (around.start - weighed.first) * candidates..(around.end - weighed.first) * candidates;
+        let part = (around.start - weighed.first) * stride..(around.end - weighed.first) * stride;
         let (logarithms, biases) = (&weighed.logarithms[part.clone()], &weighed.biases[part]);
-        let (mut weights, mut used, mut counted) = (logarithms.to_vec(), vec![false; candidates], Vec::new());
-        for row in weights.chunks_exact_mut(candidates) {
-            normalise(row, &self.variances, &mut counted);
-            for &candidate in &counted {
-                used[candidate] |= row[candidate] > 0.0;
-            }
-        }
-        let local = LocalWeights { first: around.start, candidates, logarithms, biases, weights: &weights, used };
+        let (mut weights, mut used) = (logarithms.to_vec(), vec![false; self.offsets.len()]);
+        let mut variances = self.variances.clone();
+        variances.resize(stride, 0.0);
+        let variances = &*variances;
+        dispatch(self.instructions, BlockWeights { weights: &mut weights, variances, used: &mut used });
+        let (first, weights) = (around.start, &*weights);
+        let local = LocalWeights { first, stride, logarithms, biases, weights, variances, used };
         for run in self.interpolate(means, &samples, &local, outputs, scratch) {
             self.average_run(means, &run, samples.start, &local, outputs, scratch);
         }
@@ -206,7 +159,7 @@ impl Refinement {
         outputs: &mut DerivativeOutputs<'_>,
         scratch: &mut AverageScratch,
     ) {
-        let candidates = local.candidates;
+        let candidates = self.offsets.len();
         let inside = run.start - begin..run.end - begin;
         let wanted = |all: &mut [f64]| if all.is_empty() { 0..0 } else { inside.clone() };
         let (in_errors, in_order) =
@@ -224,9 +177,8 @@ impl Refinement {
         self.between_centres(Grid::new(self.samples, 1), run.clone(), |part, place| {
             parts.push((part.start - run.start..part.end - run.start, place));
         });
-        let (rows, variances, orders) = (&*scratch.rows, &*self.variances, &*self.orders);
-        let left =
-            dispatch(self.instructions, Mixture { rows, first, variances, orders, local, parts: &parts, outputs });
+        let (rows, orders) = (&*scratch.rows, &*self.orders);
+        let left = dispatch(self.instructions, Mixture { rows, first, orders, local, parts: &parts, outputs });
         let mut missing = Vec::new();
         for (part, place) in left.into_iter().map(|index| parts[index].clone()) {
             let shares = (0..candidates).filter(|&one| local.used[one]);
@@ -254,7 +206,8 @@ impl Refinement {
             self.fill(means, run, &rest, scratch);
         }
         for (place, block) in missing {
-            let own = (block - local.first) * candidates..(block - local.first + 1) * candidates;
+            let begin = (block - local.first) * local.stride;
+            let own = begin..begin + candidates;
             let (row, biases) = (&local.logarithms[own.clone()], &local.biases[own]);
             let fits = (0..candidates)
                 .filter(|&one| !scratch.rows[one][first + place].is_nan() && row[one] > f64::NEG_INFINITY);

@@ -19,7 +19,7 @@ pub(crate) struct DerivativeOutputs<'a> {
 pub(crate) struct Weighed {
     /// The first of the blocks.
     pub(crate) first: usize,
-    /// Logarithms of weights.
+    /// Logarithms of weights, so many a block as vectors are filled with.
     pub(crate) logarithms: Vec<f64>,
     /// Squared biases.
     pub(crate) biases: Vec<f64>,
@@ -29,10 +29,13 @@ pub(crate) struct Weighed {
 pub(crate) struct LocalWeights<'a> {
     /// The first of the blocks.
     pub(crate) first: usize,
-    pub(crate) candidates: usize,
+    /// Numbers of a block: one for every candidate, and some more to fill whole vectors.
+    pub(crate) stride: usize,
     pub(crate) logarithms: &'a [f64],
     pub(crate) biases: &'a [f64],
     pub(crate) weights: &'a [f64],
+    /// Of the candidates, then zeros.
+    pub(crate) variances: &'a [f64],
     /// Candidates that have any weight.
     pub(crate) used: Vec<bool>,
 }
@@ -60,18 +63,18 @@ impl LocalWeights<'_> {
 
     /// The numbers of all candidates at the centres beside a place.
     pub(crate) fn beside<'b>(&self, numbers: &'b [f64], place: &Between) -> [&'b [f64]; 2] {
-        [place.low, place.high].map(|block| &numbers[(block - self.first) * self.candidates..][..self.candidates])
+        [place.low, place.high].map(|block| &numbers[(block - self.first) * self.stride..][..self.stride])
     }
 
     fn line(&self, numbers: &[f64], candidate: usize, place: Between) -> (f64, f64) {
-        let of = |block: usize| numbers[(block - self.first) * self.candidates + candidate];
+        let of = |block: usize| numbers[(block - self.first) * self.stride + candidate];
         let growth = of(place.high) - of(place.low);
         (of(place.low) + growth * place.distance, growth)
     }
 
     /// The sum of a candidate's weights.
     pub(crate) fn total(&self, candidate: usize) -> f64 {
-        self.weights[candidate..].iter().step_by(self.candidates).sum()
+        self.weights[candidate..].iter().step_by(self.stride).sum()
     }
 
     /// Whether any candidate of each bank is used.
@@ -83,14 +86,14 @@ impl LocalWeights<'_> {
 impl Refinement {
     /// The logarithm of every candidate's weight and its squared bias in some blocks, from the risk around each. Sums and counts begin with a block.
     pub(crate) fn weigh(&self, blocks: Range<usize>, begin: usize, sums: &[f64], counts: &[f64]) -> Weighed {
-        let (candidates, length) = (self.offsets.len(), self.blocks.length as f64);
+        let (stride, length) = (self.stride(), self.blocks.length as f64);
         let bell = |distance: usize| {
             let u = distance as f64 * length / (self.reach + length / 2.0);
             (1.0 - u * u).powi(2)
         };
         let bell: Vec<f64> = (0..=self.reach()).map(bell).collect();
         let columns: Vec<Range<usize>> = (0..self.banks.len()).map(|bank| self.candidates_of(bank)).collect();
-        let (first, all) = (blocks.start, blocks.len() * candidates);
+        let (first, all) = (blocks.start, blocks.len() * stride);
         let mut weighed = Weighed { first, logarithms: vec![0.0; all], biases: vec![0.0; all] };
         let (refinement, bell, columns) = (self, &*bell, &*columns);
         let weighing = Weighing { refinement, blocks, begin, sums, counts, bell, columns, weighed: &mut weighed };
@@ -157,20 +160,20 @@ impl Kernel for Weighing<'_> {
     fn run<S: Lanes>(self, _: S) {
         let Self { refinement, blocks, begin, sums, counts, bell, columns, weighed } = self;
         let (candidates, banks) = (refinement.offsets.len(), columns.len());
-        let packets = candidates.div_ceil(WIDTH);
+        let (stride, packets) = (refinement.stride(), candidates.div_ceil(WIDTH));
         let padded = |numbers: &[f64]| -> Vec<Packet> { (0..packets).map(|at| packet(numbers, at * WIDTH)).collect() };
         let (offsets, differences) = (padded(&refinement.offsets), padded(&refinement.differences));
         let neighbourhood = refinement.blocks.length as f64 * (2.0 * bell.iter().sum::<f64>() - bell[0]);
         let (mut sum, mut risks) = (vec![Packet::ZERO; packets], vec![0.0; packets * WIDTH]);
         // Counts change near what is missing only.
         let (mut count, mut last, mut spread) = (vec![0.0; banks], Vec::new(), vec![Packet::ZERO; packets]);
-        let rows = weighed.logarithms.chunks_exact_mut(candidates).zip(weighed.biases.chunks_exact_mut(candidates));
+        let rows = weighed.logarithms.chunks_exact_mut(stride).zip(weighed.biases.chunks_exact_mut(stride));
         for (block, (weights, biases)) in blocks.zip(rows) {
             let around = refinement.blocks_around(&(block..block + 1), bell.len() - 1);
             // As many at once as hide how long each sum takes.
             let mut at = 0;
             while at < packets {
-                let of = |other: usize| (bell[block.abs_diff(other)], (other - begin) * candidates + at * WIDTH);
+                let of = |other: usize| (bell[block.abs_diff(other)], (other - begin) * stride + at * WIDTH);
                 let weighted = around.clone().map(of);
                 match packets - at {
                     1 => sum[at..][..1].copy_from_slice(&weighted_sums::<1>(sums, weighted)),
@@ -200,8 +203,7 @@ impl Kernel for Weighing<'_> {
                     bias.0[lane] = if known { bias.0[lane] } else { 0.0 };
                 }
                 risk.store(&mut risks[at * WIDTH..]);
-                let own = candidates.min((at + 1) * WIDTH) - at * WIDTH;
-                biases[at * WIDTH..][..own].copy_from_slice(&bias.0[..own]);
+                bias.store(&mut biases[at * WIDTH..]);
             }
             let best = least(&risks[..candidates]);
             let (least, temperature) = (risks[best], refinement.temperatures[best]);
@@ -210,11 +212,11 @@ impl Kernel for Weighing<'_> {
                 continue;
             }
             let (least, twice) = (Packet::splat(least), Packet::splat(2.0 * temperature));
-            for (at, weights) in weights.chunks_mut(WIDTH).enumerate() {
+            for (at, weights) in weights.chunks_exact_mut(WIDTH).enumerate() {
                 // In this order: for an infinite temperature the quotient is zero, and zero times infinity would be NaN.
                 let risks = Packet::load(&risks[at * WIDTH..]);
                 let logarithms = (least - risks) / twice * Packet::splat(neighbourhood);
-                weights.copy_from_slice(&logarithms.0[..weights.len()]);
+                logarithms.store(weights);
             }
         }
     }
@@ -229,7 +231,7 @@ fn weighted_sums<const PACKETS: usize>(
     let mut sums = [Packet::ZERO; PACKETS];
     for (weight, from) in weighted {
         for (at, sum) in sums.iter_mut().enumerate() {
-            *sum += Packet::splat(weight) * packet(numbers, from + at * WIDTH);
+            *sum += Packet::splat(weight) * Packet::load(&numbers[from + at * WIDTH..]);
         }
     }
     sums

@@ -2,6 +2,7 @@
 
 pub(crate) mod automatic;
 pub(crate) mod block_means;
+pub(crate) mod block_weights;
 pub(crate) mod boundary;
 pub(crate) mod candidate_weights;
 pub(crate) mod candidates;
