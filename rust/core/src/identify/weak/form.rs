@@ -11,6 +11,7 @@ use crate::exec::stages::Stages;
 use crate::identify::scanned::Scan;
 use crate::identify::weak::angle_zero::outcome::FreeOffset;
 use crate::identify::weak::angle_zero::spring::STIFFNESS;
+use crate::identify::weak::below_filter::BelowFilter;
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decide::BADLY;
 use crate::identify::weak::found::WeakIdentified;
@@ -24,10 +25,8 @@ use crate::identify::weak::torque_jumps::without_jumps;
 use crate::noise::breaks::search::{Broken, breaks};
 use crate::noise::channel::{rounding_variance, variance_after, weighted_variance};
 use crate::noise::defects::{Defect, Within, defects};
-use crate::noise::low_passed::is_low_passed;
 use crate::noise::passed::PassedNoise;
 use crate::noise::quantisation::quantisation_step;
-use crate::noise::shared_band::{noise_above, shared_until};
 use crate::noise::spikes::{LONGEST, Repaired, spikes};
 use crate::noise::unread::unread;
 use crate::record::samples::Samples;
@@ -290,25 +289,6 @@ fn identify(
     settled(record, (options, whole), [levels[0], levels[1]], stages)
 }
 
-/// Where the motion ends of an angle that was low-passed, alone or by the same filter as the torque, if the width of the test function is to be chosen. The noise
-/// of such a torque is what it shows just above the motion: the quietest band has what the filter left of it.
-fn below_filter(record: &Record<'_>, options: &WeakOptions, torque_noise: &mut f64) -> Option<f64> {
-    let is_chosen = options.half_width.is_none();
-    if record.noise.is_some() || !is_low_passed(record.angle) {
-        return None;
-    }
-    if !is_low_passed(record.torque) {
-        return if is_chosen { shared_until(record.angle, record.torque) } else { None };
-    }
-    if options.noise != [None; 2] || record.weights.is_some() {
-        return None;
-    }
-    let until = shared_until(record.angle, record.torque)?;
-    let density = noise_above(until, record.angle, record.torque)?;
-    *torque_noise = torque_noise.max(density);
-    Some(until).filter(|_| is_chosen)
-}
-
 /// Identifies a record whose channels have some noise, again where pulses of the stiffness were found that hide what else there is.
 fn settled(
     record: &Record<'_>,
@@ -318,7 +298,8 @@ fn settled(
 ) -> Result<WeakIdentified, Error> {
     let step = options.quantisation.unwrap_or_else(|| quantisation_step(record.angle));
     let is_rounding = step > 0.0 && channel_noise[0] <= HARDLY_MORE * rounding_variance(step, record.weights);
-    let shared_until = below_filter(record, options, &mut channel_noise[1]);
+    let filtered = BelowFilter::new(record, options, channel_noise[1]);
+    channel_noise[1] = filtered.torque_noise[0];
     // What looks like a pulse where samples are missing may be a loss that was not detected.
     let (mut pulses, mut calm, mut round) = (Vec::new(), Vec::new(), if whole { 0 } else { PULSE_ROUNDS });
     loop {
@@ -333,7 +314,8 @@ fn settled(
             noise: [0.0; 2],
             channel_noise,
             is_rounding,
-            shared_until,
+            highest_noise: filtered.torque_noise[1],
+            shared_until: filtered.until,
             scan: Scan::default(),
             free_offset: FreeOffset::default(),
             windowed_offset: None,

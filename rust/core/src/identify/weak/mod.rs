@@ -1,6 +1,7 @@
 //! Identification in weak form: test function, decisions, report.
 
 pub(crate) mod angle_zero;
+pub(crate) mod below_filter;
 pub(crate) mod choice;
 pub(crate) mod decide;
 pub(crate) mod decided;

@@ -29,10 +29,12 @@ pub(crate) struct Session<'a, 'b, 'c> {
     /// Variances of the noise of angle and torque that decisions are made with, and those that the channels show by themselves.
     pub(crate) noise: [f64; 2],
     pub(crate) channel_noise: [f64; 2],
+    /// Variance of the torque's noise at the highest frequencies: a filter of the torque alone left less there.
+    pub(crate) highest_noise: f64,
     /// Whether the noise of the angle is that of its rounding: in slow motion it lasts, so that parts of the record scatter more than white noise says.
     pub(crate) is_rounding: bool,
-    /// Cycles per sample up to which both channels show the same motion, where the angle was low-passed, alone or as the torque was, and the width of the
-    /// test function is to be chosen.
+    /// Cycles per sample up to which both channels show the same motion, where one was low-passed, or both alike, and the width of the test function is
+    /// to be chosen.
     pub(crate) shared_until: Option<f64>,
     /// Estimates by the width of the test function.
     pub(crate) scan: Scan,
@@ -136,8 +138,17 @@ impl Session<'_, '_, '_> {
 
     /// The rows' covariance as the noise of both channels makes it, and what windows are expected to leave.
     pub(crate) fn covariance(&self, weak: &WeakRows, parameters: [f64; 3]) -> (RowCovariance, Expected) {
-        let known = RowCovariance::known(&weak.noise, &weak.torque, parameters, self.noise, weak.stride);
-        let torque = RowCovariance::known(&weak.noise, &weak.torque, [0.0; 3], self.noise, weak.stride).variance();
+        Self::covariance_of_noise(self.noise, weak, parameters)
+    }
+
+    /// The same of some noise of angle and torque.
+    pub(crate) fn covariance_of_noise(
+        noise: [f64; 2],
+        weak: &WeakRows,
+        parameters: [f64; 3],
+    ) -> (RowCovariance, Expected) {
+        let known = RowCovariance::known(&weak.noise, &weak.torque, parameters, noise, weak.stride);
+        let torque = RowCovariance::known(&weak.noise, &weak.torque, [0.0; 3], noise, weak.stride).variance();
         let expected = Expected::new(&known, torque);
         (known, expected)
     }

@@ -80,12 +80,16 @@ impl Session<'_, '_, '_> {
         rows.regressors.extend(more.rows.regressors.into_iter().skip(3));
         rows.clear_unusable();
         // Rows as they are, also where equations were weighted by their noise.
-        let (known, expected) = self.covariance(weak, self.parameters(&decided.model, fit));
+        // The noise of a torque that was low-passed alone is less where its derivatives have most of theirs; what equations show beyond the channel's is there.
+        let highest = self.highest_noise.min(self.channel_noise[1]);
+        let is_shown = self.noise[1] > self.channel_noise[1];
+        let noise = [self.noise[0], if is_shown { self.noise[1] } else { highest.min(self.noise[1]) }];
+        let (known, expected) = Self::covariance_of_noise(noise, weak, self.parameters(&decided.model, fit));
         // What changes slowly was taken off the right-hand side; a constant beside it is what it may be wrong by.
         let (model, instructions) = (decided.ordered(), self.options.instructions);
         let problem = model.problem(&rows, &rhs, self.noise[0], None);
         let before = fit.again(&problem, expected, instructions, &mut self.stages)?;
-        add_noise_of_torque(&mut rows, weak, first, [self.noise[0], self.channel_noise[1]]);
+        add_noise_of_torque(&mut rows, weak, first, [self.noise[0], highest]);
         let constant = model.constant.iter().copied().chain(first..first + DERIVATIVES.len()).collect();
         let model = Model { constant, ..model };
         let problem = model.problem(&rows, &rhs, 1.0, None);

@@ -121,7 +121,7 @@ impl Session<'_, '_, '_> {
             }
             // A lag is judged beside what follows it: where the curve of what varies slowly is hardly told, it follows anything, and what it is wrong by
             // looks like a lag.
-            let follows = is_lag && !decided.slow.is_empty();
+            let follows = is_lag && followed.as_ref().is_some_and(|by| !by.is_empty());
             let regressors = if follows { vec![end, first + place] } else { vec![first + place] };
             let place = first + place;
             let judged = JudgedTerm {
