@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from tvident._arguments.containers import package_of
 from tvident._arguments.times import times_of
-from tvident._units import ROTARY, is_convertible, named_unit, times_in_seconds, unit_said
+from tvident._units import ROTARY, factor_to, is_convertible, named_unit, times_in_seconds, unit_said
 
 _OTHER_RATE = 0.1
 """Times of few digits and gaps move steps by less than this part; a wrong rate is off by more."""
@@ -71,34 +71,40 @@ def check_against_labels(values: Any, period: float) -> None:
 
 
 def _check_against_numbers(values: Any, period: float) -> None:
-    """Refuse a sample period that labels which are called as times show in no unit; what merely counts samples shows none."""
-    labels = _called_times(values)
-    if labels is None or labels.size < 2 or not np.isfinite(labels).all():  # noqa: PLR2004 - a step
+    """Refuse a sample period that labels which are called as times show in no unit they may have; what merely counts samples shows none."""
+    labels, units = _called_times(values)
+    if labels.size < 2 or not np.isfinite(labels).all():  # noqa: PLR2004 - a step
         return
     steps = np.diff(labels)
     usual, mean = float(np.median(steps)), float(labels[-1] - labels[0]) / steps.size
     if usual <= 0 or (steps == 1).all() or abs(mean / usual - 1) > _OTHER_RATE:
         return
-    if all(abs(period / (usual * unit) - 1) > _OTHER_RATE for unit in _UNITS):
+    if all(abs(period / (usual * unit) - 1) > _OTHER_RATE for unit in units):
+        step = usual * units[0]
+        known = f"{step:.6g} s apart ({1 / step:.6g} Hz)"
+        if len(units) > 1:
+            known = f"{usual:.6g} apart ({1 / step:.6g} Hz if they are seconds)"
         raise ValueError(
             f"the sample period must be that of the labels of the samples, which are called as times are; got {period:.6g} s "
-            f"({1 / period:.6g} Hz), and labels {usual:.6g} apart ({1 / usual:.6g} Hz if they are seconds); give t= in their place, or "
-            "pass .to_numpy() if the labels are wrong"
+            f"({1 / period:.6g} Hz), and labels {known}; give the labels as t=, or pass .to_numpy() if they are wrong"
         )
 
 
-def _called_times(values: Any) -> npt.NDArray[np.float64] | None:
-    """Return numbers that label samples and are called as times are, in a unit that nobody says; None where there are none."""
+def _called_times(values: Any) -> tuple[npt.NDArray[np.float64], tuple[float, ...]]:
+    """Return numbers that label samples and are called as times are, none where there are none, and seconds of what they may be in."""
     found: list[tuple[Any, Any]] = []
     if package_of(values) == "pandas" and hasattr(values, "index"):
         found = [(values.index.name, values.index)]
     elif package_of(values) == "xarray" and hasattr(values, "dims"):
         found = [(dim, values.coords[dim]) for dim in values.dims if dim in values.coords]
     for name, labels in found:
-        is_called = isinstance(name, str) and is_called_time(named_unit(name)[0])
-        if is_called and getattr(getattr(labels, "dtype", None), "kind", "O") in "iuf":
-            return np.asarray(labels, dtype=np.float64)
-    return None
+        bare, unit = named_unit(name) if isinstance(name, str) else ("", "")
+        unit = unit or unit_said(labels)
+        is_numbers = getattr(getattr(labels, "dtype", None), "kind", "O") in "iuf"
+        if is_called_time(bare) and is_numbers and (not unit or is_convertible(ROTARY, "time", unit)):
+            units = (factor_to(ROTARY, "time", unit, name="the time"),) if unit else _UNITS
+            return np.asarray(labels, dtype=np.float64), units
+    return np.empty(0), ()
 
 
 def is_called_time(name: str) -> bool:
