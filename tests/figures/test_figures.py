@@ -156,6 +156,11 @@ def test_a_file_is_drawn_with_its_units(rig: tvident.Recording) -> None:
         (drawn,) = figures.plot_recording({name: np.arange(rig.angle.size), "angle [rad]": rig.angle}).axes
         assert np.asarray(drawn.lines[0].get_xdata())[-1] == (rig.angle.size - 1) * (1e-3 if "ms" in name else 1)
         assert drawn.get_title(loc="left") + drawn.get_title() == "Angle"
+    # What decreases is no time, and dates are seconds from the first on.
+    assert len(figures.plot_recording({"angle": rig.angle, "t": rig.torque}, sample_rate=1000).axes) == 2
+    dates = np.datetime64("2024-01-05T12:00:00", "ms") + np.arange(rig.angle.size)
+    (drawn,) = figures.plot_recording({"timestamp": dates, "angle": rig.angle}).axes
+    assert np.asarray(drawn.lines[0].get_xdata())[-1] == pytest.approx((rig.angle.size - 1) / 1000)
 
 
 @pytest.mark.slow

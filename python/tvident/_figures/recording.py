@@ -85,17 +85,20 @@ def plot_recording(
         return figure
 
 
-def _is_time(name: str, unit: str) -> bool:
-    """Return whether a channel is called as times are, in a unit of time or none."""
-    return arguments.is_called_time(name.strip()) and (not unit or is_convertible(ROTARY, "time", unit))
+def _is_time(full: str, values: npt.NDArray[Any]) -> bool:
+    """Return whether a channel is called as times are, in a unit of time or none. A torque may be called t, but decreases."""
+    name, unit = (one.strip() for one in named_unit(full))
+    is_called = arguments.is_called_time(name) and (not unit or is_convertible(ROTARY, "time", unit))
+    return is_called and (name.lower() == "time" or not (values[1:] < values[:-1]).any())
 
 
 def _time(channels: dict[str, npt.NDArray[Any]], sample_rate: float | None) -> npt.NDArray[np.float64]:
     """Take the time out of channels, or make it."""
-    named = [name for name in channels if _is_time(*named_unit(name))]
+    named = [name for name, values in channels.items() if _is_time(name, values)]
     time = None
     if named:
-        time = np.asarray(times_in_seconds(Channel(channels.pop(named[0]), named_unit(named[0])[1])))
+        given = channels.pop(named[0])
+        time = arguments.times_of(times_in_seconds(Channel(given, named_unit(named[0])[1])))
     sizes = {values.shape for values in channels.values()}
     if len(sizes) != 1 or len(next(iter(sizes))) != 1:
         raise ValueError(f"channels must be single records of one length; got shapes {sorted(sizes)}; cut them")
