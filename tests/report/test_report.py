@@ -395,3 +395,15 @@ def test_records_that_begin_at_different_times_lie_beside_each_other(tmp_path: P
     assert page["facts"].endswith("times of the plots count from the beginning of each")
     assert {one["start"] for one in page["series"]} == {0.0}
     assert all(0 <= time <= 3 for one in page["warnings"] for times in one["times"] for time in times)
+
+
+def test_what_records_share_is_doubted_first_and_lengths_are_counted(tmp_path: Path) -> None:
+    rig = tvident.simulate_torsional_rig(3.0, pattern="square")
+    found = tvident.identify([rig.angle] * 2, [rig.torque, 1.05 * rig.torque], sample_rate=1000, share=("inertia",))
+    assert isinstance(found, tvident.IdentifiedRecords)
+    found.report(tmp_path / "list.html")
+    page = content_of(tmp_path / "list.html")
+    assert page["verdict"].startswith("records differ in inertia by more than their errors explain (")
+    assert (page["tone"], page["facts"]) == ("bad", "2 records of 2.999 s")
+    found[:1].report(tmp_path / "one.html")
+    assert content_of(tmp_path / "one.html")["facts"] == "1 record of 2.999 s"

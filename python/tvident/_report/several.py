@@ -67,7 +67,7 @@ def content_of_list(shown: ShownList, title: str) -> tuple[dict[str, Any], list[
             "name": title_of(name),
             "unit": unit_of(name, units),
             "value": arguments.with_error(value, error),
-            "kind": f"shared by {len(parts)} records",
+            "kind": f"shared by {_counted(len(parts))}",
             "more": "",
         }
         for name, (value, error) in shown.shared.items()
@@ -76,14 +76,14 @@ def content_of_list(shown: ShownList, title: str) -> tuple[dict[str, Any], list[
     for number, one in enumerate(parts):
         own = [line for line in one["numbers"] if line["name"] not in common]
         numbers += [line | {"name": f"Record {number}: {line['name']}"} for line in own]
-    last = [one["span"][1] - one["span"][0] for one in parts]
+    lengths = [one["span"][1] - one["span"][0] for one in parts]
     first = begins[0] if is_together else 0.0
     clock = "" if is_together else "; times of the plots count from the beginning of each"
     content = parts[0] | {
-        "verdict": _verdict(parts),
+        "verdict": _verdict(parts, shown.advice),
         "tone": min((one["tone"] for one in parts), key=_WORST_FIRST.index) if not shown.advice else "bad",
-        "span": [first, first + max(last)],
-        "facts": f"{len(parts)} records of {min(last):.4g} to {max(last):.4g} s{clock}",
+        "span": [first, first + max(lengths)],
+        "facts": f"{_counted(len(parts))} of {_range(lengths)} s{clock}",
         "numbers": numbers,
         "advice": [*shown.advice, *_of_each(parts, "advice")],
         "warnings": [
@@ -101,15 +101,27 @@ def content_of_list(shown: ShownList, title: str) -> tuple[dict[str, Any], list[
     return content, series
 
 
-def _verdict(parts: Sequence[Mapping[str, Any]]) -> str:
-    """Return the verdict of the worst record, and how many are as bad."""
+def _verdict(parts: Sequence[Mapping[str, Any]], shared: Sequence[str]) -> str:
+    """Return the verdict of the worst record, and how many are as bad; first what is wrong with what is shared, unless one explains it."""
     worst = min((one["tone"] for one in parts), key=_WORST_FIRST.index)
     places = [place for place, one in enumerate(parts) if one["tone"] == worst]
+    said = [] if worst == "bad" else [one.partition(": ")[0] for one in shared]
     if worst == "good":
-        return f"{len(parts)} records, no reason to distrust any; record 0: {parts[0]['verdict']}"
-    which = f" ({arguments.listed([str(one) for one in places])})" if len(places) > 1 else ""
-    word = "not to be trusted" if worst == "bad" else "to be looked at"
-    return f"{len(places)} of {len(parts)} records {word}{which}; record {places[0]}: {parts[places[0]]['verdict']}"
+        said.append(f"{_counted(len(parts))}, no reason to distrust any")
+    else:
+        which = f" ({arguments.listed([str(one) for one in places])})" if len(places) > 1 else ""
+        word = "not to be trusted" if worst == "bad" else "to be looked at"
+        said.append(f"{len(places)} of {_counted(len(parts))} {word}{which}")
+    return "; ".join([*said, f"record {places[0]}: {parts[places[0]]['verdict']}"])
+
+
+def _counted(records: int) -> str:
+    return "1 record" if records == 1 else f"{records} records"
+
+
+def _range(lengths: Sequence[float]) -> str:
+    """Return the least and the greatest, once where they are written alike."""
+    return " to ".join(dict.fromkeys(f"{one:.4g}" for one in (min(lengths), max(lengths))))
 
 
 def _of_each(parts: Sequence[Mapping[str, Any]], name: str) -> list[str]:
