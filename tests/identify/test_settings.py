@@ -11,6 +11,7 @@ import pytest
 
 import tvident
 from calls import paper, plain_weak, strong, weak
+from tvident import _arguments as arguments
 
 RIG = tvident.simulate_torsional_rig(6.0, angle_noise=1e-3)
 WHOLE: dict[str, Any] = {"sample_rate": 1000}
@@ -217,9 +218,16 @@ def test_an_option_that_there_is_not_is_told_what_is_right(options: dict[str, An
 def test_what_has_no_name_is_told_that_it_needs_one() -> None:
     """It heard "takes 2 positional arguments but 3 were given"."""
     identify: Any = tvident.identify
-    words = "identify takes everything but angle and torque by name; got 1000 without one; write sample_rate= in front of it"
-    with pytest.raises(TypeError, match=re.escape(words)):
-        identify(np.zeros(100), np.zeros(100), 1000)
+    given: list[tuple[Any, str]] = [
+        (1000, "sample_rate"),
+        (np.arange(100) / 1000, "t"),
+        (tvident.StrongForm(), "method"),
+    ]
+    for value, name in given:
+        shown = re.escape(arguments.shown(value))
+        words = f"identify takes everything but angle and torque by name; got {shown} without one; write {name}= in front of it"
+        with pytest.raises(TypeError, match=words):
+            identify(np.zeros(100), np.zeros(100), value)
 
 
 @pytest.mark.parametrize(

@@ -47,9 +47,10 @@ def explained(function: _Function, called: str = "identify") -> _Function:
     def call(*args: Any, **options: Any) -> Any:
         # Forms take settings in order; nothing but the data of a record has one.
         if len(args) > len(in_order) and "sample_rate" in known:
+            nameless = args[len(in_order)]
             raise TypeError(
-                f"{called} takes everything but {' and '.join(in_order)} by name; got {arguments.shown(args[len(in_order)])} without one; "
-                "write sample_rate= in front of it"
+                f"{called} takes everything but {' and '.join(in_order)} by name; got {arguments.shown(nameless)} without one; "
+                f"write {_name_of(nameless)}= in front of it"
             )
         if not known.issuperset(options):
             name = next(name for name in options if name not in known)
@@ -57,6 +58,13 @@ def explained(function: _Function, called: str = "identify") -> _Function:
         return function(*args, **options)
 
     return call  # type: ignore[return-value]  # takes what the function takes
+
+
+def _name_of(value: Any) -> str:
+    """Return the name that a value without one most likely needs: many numbers are times, a word or a form is a method."""
+    if isinstance(value, str) or type(value).__name__ in _FORMS:
+        return "method"
+    return "t" if hasattr(value, "__len__") else "sample_rate"
 
 
 def _right(name: str, known: frozenset[str]) -> str:
