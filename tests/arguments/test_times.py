@@ -105,5 +105,8 @@ def test_dates_of_every_kind() -> None:
 def test_a_unit_of_time_beside_a_rate_in_hz_is_refused() -> None:
     """One sample in a ms was taken for one in a second: the inertia was a million times too large."""
     rig = tvident.simulate_torsional_rig(duration=2, sample_rate=1000)
-    with pytest.raises(TypeError, match=r"got 'ms' beside sample_rate, which is in Hz; leave it out, or give delta="):
+    with pytest.raises(
+        TypeError,
+        match=r"time_unit= is the unit of t= and delta=; got 'ms' beside sample_rate=, which is in Hz; leave it out, or give delta=",
+    ):
         tvident.identify(rig.angle, rig.torque, sample_rate=1, time_unit="ms")

@@ -401,8 +401,8 @@ def sampled(
         return arguments.sample_period(samples, t=implied), implied
     if time_unit is not None and time["sample_rate"] is not None:
         raise TypeError(
-            f"time_unit is the unit of t and delta; got {arguments.shown(time_unit)} beside sample_rate, which is in Hz; leave it out, or "
-            "give delta= in its place"
+            f"time_unit= is the unit of t= and delta=; got {arguments.shown(time_unit)} beside sample_rate=, which is in Hz; leave it "
+            "out, or give delta= in its place"
         )
     if time["t"] is not None:
         time["t"] = times_in_seconds(time["t"], time_unit, has_argument=True)
