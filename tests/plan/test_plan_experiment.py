@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -116,6 +117,7 @@ def test_what_would_be_ignored_is_refused() -> None:
         ValueError, match=r"got a part of .* samples; pass the whole result, or identify the part alone"
     ):
         tvident.plan_experiment(result=result.between(1, 2))
+    assert tvident.plan_experiment(result=result.between()).errors == tvident.plan_experiment(result=result).errors
     with pytest.raises(TypeError, match="got result= and inertia=, band=; leave out one"):
         tvident.plan_experiment(result=result, inertia=0.01, band=(1, 2))
     with pytest.raises(TypeError, match="got result= and angle_noise=, sample_rate=; leave out one"):
@@ -227,3 +229,14 @@ def test_numbers_at_the_limits_of_doubles_are_refused_or_planned(name: str, valu
         assert "; take other units" in str(refused) or "; check the units" in str(refused)  # noqa: PT017 - or none
     else:
         assert np.isfinite([plan.duration, plan.torque_rms, plan.angle_rms, *plan.errors.values()]).all()
+
+
+def test_a_part_stays_one_in_a_file_and_of_a_batch(tmp_path: Path) -> None:
+    rig = tvident.simulate_torsional_rig(duration=2.0)
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
+    result.between(0.5, 1).save(tmp_path / "part.npz")
+    batch = tvident.identify(np.stack([rig.angle] * 2), np.stack([rig.torque] * 2), sample_rate=1000)
+    for part in (tvident.load(tmp_path / "part.npz"), batch.between(0.5, 1)[0], batch[0].between(0.5, 1)):
+        with pytest.raises(ValueError, match="got a part of 501 samples"):
+            tvident.plan_experiment(result=part)
+    tvident.plan_experiment(result=batch[0])

@@ -266,7 +266,7 @@ def _longer(result: Identification, wanted: float, more: float) -> ExperimentPla
         )
     if result.inertia.ndim != 1:
         raise ValueError(f"a plan is for one record; got shape {result.inertia.shape}; take one of them")
-    if result._is_part:  # noqa: SLF001 - what it is of
+    if result._found.is_part:  # noqa: SLF001 - nobody else asks
         raise ValueError(
             f"a plan goes on from a whole record, whose constants the result has; got a part of {result.time.size} samples; pass the whole "
             "result, or identify the part alone"

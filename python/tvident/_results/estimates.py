@@ -48,6 +48,8 @@ class Estimates:
         Curves of parameters that are expansions.
     in_common : mapping of str to float or ndarray, shape (\*)
         The part of the squares of errors that all samples have in common, through constants; all of them where nothing is told.
+    is_part : bool
+        Some of the samples of records, of all of which constants are.
     """
 
     values: Mapping[str, Array]
@@ -66,3 +68,4 @@ class Estimates:
     units: Mapping[str, str] = field(default_factory=lambda: UNITS)
     expansions: Mapping[str, ExpandedParameter] = field(default_factory=dict)
     in_common: Mapping[str, Any] = field(default_factory=dict)
+    is_part: bool = False

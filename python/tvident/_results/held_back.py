@@ -35,10 +35,6 @@ _FUNCTIONS = 10
 """Test functions that a part must be long, so that the held-back tenth of it is as long as one."""
 
 
-OF_A_PART = "this is a part of a result; ask the whole"
-"""Why a part of a result has none."""
-
-
 @dataclass(frozen=True)
 class HeldBack:
     r"""What a model explains of samples that it was not fitted to, in percent of the variance of their angle.

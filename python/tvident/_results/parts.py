@@ -92,6 +92,7 @@ def of_samples(found: Estimates, samples: slice) -> Estimates:
         order=found.order[..., samples],
         status=found.status[..., samples],
         labels=None if found.labels is None else found.labels.at(samples),
+        is_part=found.is_part or samples.stop - samples.start < found.status.shape[-1],
     )
 
 

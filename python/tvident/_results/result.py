@@ -13,7 +13,7 @@ import numpy.typing as npt
 from tvident._arguments import told_once
 from tvident._results.curve import ExpandedParameter
 from tvident._results.estimates import Estimates
-from tvident._results.held_back import OF_A_PART, HeldBack
+from tvident._results.held_back import HeldBack
 from tvident._results.oscillator import Oscillator
 from tvident._results.parts import (
     At,
@@ -297,13 +297,8 @@ class Identification(Shown):
             words=self._words,
             settings=self.settings,
         )
-        part._held_back = HeldBack(why_not=OF_A_PART)
+        part._held_back = HeldBack(why_not="this is a part of a result; ask the whole")
         return part
-
-    @property
-    def _is_part(self) -> bool:
-        """Whether it holds some of the samples of a record: its constants are of all."""
-        return self._held_back is not None and self._held_back.why_not == OF_A_PART
 
     def __iter__(self) -> Iterator[Identification]:
         return (self[record] for record in range(self.inertia.shape[0] if self.inertia.ndim > 1 else 1))

@@ -67,6 +67,7 @@ def plain_result(table: Table, found: Estimates, rest: Mapping[str, Any]) -> tup
         "labels": labels,
         "units": dict(found.units),
         "expansions": plain_curves(found.expansions),
+        "is_part": found.is_part,
         **rest,
     }
     return {**arrays, **more}, facts
@@ -111,6 +112,7 @@ def _estimates(arrays: Arrays, facts: Mapping[str, Any]) -> Estimates:
         in_common={name: number(part) for name, part in facts.get("in_common", {}).items()},
         units=facts["units"],
         expansions=curves_from(facts.get("expansions", {})),
+        is_part=facts.get("is_part", False),
     )
 
 
