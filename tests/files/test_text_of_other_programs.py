@@ -188,11 +188,12 @@ def test_a_packed_text_is_whole_and_of_a_size_that_recordings_have(
         (
             "shift_jis",
             "角度",
-            r"'\\x8ap\\x93x \[deg\]' is neither .*: it may be '角度 \[deg\]' in Shift-JIS or .*; save the file as UTF-8",
+            r"'\\x8ap\\x93x \[deg\]' is neither in UTF-8 nor .*: it may be '角度 \[deg\]' in Shift-JIS or .*; save the file as UTF-8",
         ),
         ("gbk", "扭矩", r"'扭矩 \[deg\]' in GB 18030 or"),
         ("euc_kr", "토크", r" or '토크 \[deg\]' in EUC-KR"),
         ("cp1251", "угол", r"'угол \[deg\]' in Windows-1251"),
+        ("cp1252", "Winkel\u2013", "nor in Latin-1: it may be 'Winkel\u2013 \\[deg\\]' in Windows-1252; save"),
     ],
 )
 def test_names_in_another_alphabet_are_said(tmp_path: Path, encoding: str, name: str, words: str) -> None:

@@ -51,8 +51,8 @@ _ALPHABETS = {
     "cp932": "Shift-JIS",
     "gb18030": "GB 18030",
     "euc_kr": "EUC-KR",
-    "cp1251": "Windows-1251",
     "cp1252": "Windows-1252",
+    "cp1251": "Windows-1251",
 }
 """In which programs write names, where not in UTF-8."""
 
@@ -216,16 +216,17 @@ def _say_foreign(names: Sequence[str], say: Say) -> None:
     foreign = next((name for name in names if _FOREIGN.search(_WESTERN.sub(" ", name))), None)
     if foreign is None:
         return
-    maybe = []
+    maybe: dict[str, str] = {}
     for encoding, called in _ALPHABETS.items():
         try:
             name = foreign.encode(_WESTERN_EUROPEAN).decode(encoding)
         except UnicodeError:
             continue
         if name != foreign:
-            maybe.append(f"'{printable(name, 40)}' in {called}")
-    known = f": it may be {' or '.join(maybe)}" if maybe else ""
-    say(f"the name '{printable(foreign, 40)}' is neither UTF-8 nor Western European{known}; save the file as UTF-8")
+            maybe.setdefault(name, called)
+    each = [f"'{printable(name, 40)}' in {called}" for name, called in maybe.items()]
+    known = f": it may be {' or '.join(each)}" if each else ""
+    say(f"the name '{printable(foreign, 40)}' is neither in UTF-8 nor in Latin-1{known}; save the file as UTF-8")
 
 
 def _with_whole_names(lines: list[str]) -> list[str]:
