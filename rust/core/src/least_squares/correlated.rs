@@ -203,15 +203,8 @@ impl Kernel for Correlations<'_, '_, '_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) -> Vec<Neighbours> {
-        let regressors = self.fits.plan.regressors;
-        if const { S::F64_LANES == 1 } {
-            return match regressors {
-                ..=4 => self.run_with::<S, 4, 0>(simd),
-                5..=8 => self.run_with::<S, 8, 0>(simd),
-                _ => self.run_with::<S, 16, 0>(simd),
-            };
-        }
-        match regressors {
+        match self.fits.plan.regressors {
+            ..=4 if S::F64_LANES == 1 => self.run_with::<S, 4, 0>(simd),
             1 => self.run_with::<S, 4, 1>(simd),
             2 => self.run_with::<S, 4, 2>(simd),
             3 => self.run_with::<S, 4, 3>(simd),
@@ -262,15 +255,9 @@ impl Kernel for Sandwich<'_, '_, '_> {
     fn run<S: Lanes>(self, simd: S) {
         // Numbers of a row side by side, of the pairs of them, and of the regressors where these are few and vectors pay for kernels of
         // their own.
-        let regressors = self.fits.plan.regressors;
-        if const { S::F64_LANES == 1 } {
-            return match regressors {
-                ..=4 => self.run_with::<S, 4, 12, 0>(simd),
-                5..=8 => self.run_with::<S, 8, 40, 0>(simd),
-                _ => self.run_with::<S, 16, 136, 0>(simd),
-            };
-        }
-        match regressors {
+        match self.fits.plan.regressors {
+            ..=4 if S::F64_LANES == 1 => self.run_with::<S, 4, 12, 0>(simd),
+            ..=8 if S::F64_LANES == 1 => self.run_with::<S, 8, 40, 0>(simd),
             1 => self.run_with::<S, 4, 1, 1>(simd),
             2 => self.run_with::<S, 4, 8, 2>(simd),
             3 => self.run_with::<S, 4, 8, 3>(simd),

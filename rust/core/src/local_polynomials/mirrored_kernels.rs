@@ -211,7 +211,7 @@ impl<const WIDTH: usize> Kernel for PairSums<'_, '_, WIDTH> {
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
         // As many sums as hide how long each takes, and as there are registers for.
-        if const { S::F64_LANES < MOST_LANES } {
+        if S::F64_LANES < MOST_LANES {
             match WIDTH {
                 2 => self.0.run::<S, 2, 4>(simd),
                 4 => self.0.run::<S, 4, 2>(simd),

@@ -2,8 +2,7 @@
 
 /// Writes a block of code once for every `J` below a bound known when compiling, upwards or downwards.
 ///
-/// Loops over the degrees must be unrolled whole, so that the coefficients stay in registers. The bound is compared in a constant block, so that
-/// the compiler is never given the copies beyond it.
+/// Loops over the degrees must be unrolled whole, so that the coefficients stay in registers.
 macro_rules! unroll {
     ($index:ident < $bound:expr, $body:block) => {
         $crate::simd::unroll::unroll!(@ $index, $bound, $body, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19)
@@ -14,7 +13,7 @@ macro_rules! unroll {
     (@ $index:ident, $bound:expr, $body:block, $($value:literal)*) => {
         $({
             const $index: usize = $value;
-            if const { $index < $bound } $body
+            if $index < $bound $body
         })*
     };
 }
