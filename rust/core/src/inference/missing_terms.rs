@@ -186,23 +186,15 @@ mod tests {
     const ROWS: usize = 800;
     const DEVIATION: f64 = 0.3;
 
-    /// The coefficients, over their standard errors and off the truth in standard errors, of a term that is missing and of one that is not.
-    fn factors(true_value: f64) -> [(f64, f64); 2] {
-        let mut rows = rows(ROWS, |time| [1.0 + 0.01 * time, 0.01], DEVIATION);
-        for seed in [40, 41] {
-            let value = random(seed, ROWS);
-            if seed == 40 {
-                rows.rhs.iter_mut().zip(&value).for_each(|(rhs, value)| *rhs += true_value * value);
-            }
-            rows.regressors.push(Regressor { companion: vec![0.0; ROWS], value, ..Regressor::default() });
-        }
-        let (model, covariance) = (model(), RowCovariance::by_distance(vec![DEVIATION * DEVIATION]));
-        let correlated = staged(|stages| model.correlated(&rows, &covariance, stages));
-        let problem = model.problem(&rows, &rows.rhs, 0.0, Some(&correlated));
-        let expected = white(DEVIATION * DEVIATION);
+    /// What a judge says of terms that are added to the fit of some rows, whose noise has a variance.
+    fn judged<R>(rows: &Rows, variance: f64, judge: impl FnOnce(&JudgedTerm<'_>) -> R) -> R {
+        let (model, covariance) = (model(), RowCovariance::by_distance(vec![variance]));
+        let correlated = staged(|stages| model.correlated(rows, &covariance, stages));
+        let problem = model.problem(rows, &rows.rhs, 0.0, Some(&correlated));
+        let expected = white(variance);
         let fit = Fit::in_rows(&problem, 80, expected, Instructions::Scalar).expect("constants");
-        let judged = JudgedTerm {
-            rows: &rows,
+        judge(&JudgedTerm {
+            rows,
             model: &model,
             rhs: &rows.rhs,
             noise: 0.0,
@@ -212,8 +204,27 @@ mod tests {
             expected,
             inflation: 1.0,
             instructions: Instructions::Scalar,
-        };
-        [3, 4].map(|regressor| staged(|stages| judged.factor(regressor, stages)).expect("determined"))
+        })
+    }
+
+    /// A regressor of these values, without a companion.
+    fn column(value: Vec<f64>) -> Regressor {
+        Regressor { companion: vec![0.0; ROWS], value, ..Regressor::default() }
+    }
+
+    /// The coefficients, over their standard errors and off the truth in standard errors, of a term that is missing and of one that is not.
+    fn factors(true_value: f64) -> [(f64, f64); 2] {
+        let mut rows = rows(ROWS, |time| [1.0 + 0.01 * time, 0.01], DEVIATION);
+        for seed in [40, 41] {
+            let value = random(seed, ROWS);
+            if seed == 40 {
+                rows.rhs.iter_mut().zip(&value).for_each(|(rhs, value)| *rhs += true_value * value);
+            }
+            rows.regressors.push(column(value));
+        }
+        judged(&rows, DEVIATION * DEVIATION, |judged| {
+            [3, 4].map(|regressor| staged(|stages| judged.factor(regressor, stages)).expect("determined"))
+        })
     }
 
     #[test]
@@ -236,30 +247,14 @@ mod tests {
         // The second is half of the first, and something of its own.
         let (first, own) = (random(40, ROWS), random(41, ROWS));
         let second = first.iter().zip(&own).map(|(first, own)| 0.5 * first + own).collect();
-        for value in [first, second] {
-            rows.regressors.push(Regressor { companion: vec![0.0; ROWS], value, ..Regressor::default() });
-        }
-        let (model, covariance) = (model(), RowCovariance::by_distance(vec![1.0]));
-        let correlated = staged(|stages| model.correlated(&rows, &covariance, stages));
-        let problem = model.problem(&rows, &rows.rhs, 0.0, Some(&correlated));
-        let fit = Fit::in_rows(&problem, 80, white(1.0), Instructions::Scalar).expect("constants");
-        let judged = JudgedTerm {
-            rows: &rows,
-            model: &model,
-            rhs: &rows.rhs,
-            noise: 0.0,
-            fit: &fit,
-            covariance: &covariance,
-            correlated: &correlated,
-            expected: white(1.0),
-            inflation: 1.0,
-            instructions: Instructions::Scalar,
-        };
-        let (factors, changes) =
-            staged(|stages| judged.factors_and_changes(&[3, 4], stages)).expect("both are determined");
-        assert_eq!((factors.len(), changes.len()), (2, model.constant.len() + 1));
+        rows.regressors.extend([first, second].map(column));
+        let (factors, changes) = judged(&rows, 1.0, |judged| {
+            staged(|stages| judged.factors_and_changes(&[3, 4], stages)).expect("both are determined")
+        });
+        let constants = model().constant.len();
+        assert_eq!((factors.len(), changes.len()), (2, constants + 1));
         // With every unit of the second the first goes back by half a unit, as far as 800 random rows tell.
-        assert!((changes[model.constant.len()] + 0.5).abs() < 4.0 / (ROWS as f64).sqrt(), "{changes:?}");
+        assert!((changes[constants] + 0.5).abs() < 4.0 / (ROWS as f64).sqrt(), "{changes:?}");
     }
 
     #[test]

@@ -29,9 +29,11 @@ const CHANCE: f64 = 2.0;
 /// The largest density of a torque that was low-passed where the angle shows nothing but noise: what equations leave of it may be noise up to that,
 /// of which the quietest band knows nothing. Zero where it was not.
 pub(crate) fn density_above_motion(angle: &dyn Samples, torque: &dyn Samples, weights: Option<&[f64]>) -> f64 {
-    if !is_low_passed(torque) {
-        return 0.0;
-    }
+    if is_low_passed(torque) { largest_density_at_rest(angle, torque, weights) } else { 0.0 }
+}
+
+/// The same of a torque that is known to be low-passed.
+pub(crate) fn largest_density_at_rest(angle: &dyn Samples, torque: &dyn Samples, weights: Option<&[f64]>) -> f64 {
     let [angle, torque] = [angle, torque].map(|channel| bands(channel, weights).0);
     let quietest = angle.iter().copied().fold(f64::INFINITY, f64::min);
     let still = angle.iter().zip(torque).filter(|(angle, _)| **angle <= CHANCE * quietest);

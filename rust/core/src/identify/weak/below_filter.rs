@@ -2,7 +2,7 @@
 //! the highest ones.
 
 use crate::identify::weak::options::WeakOptions;
-use crate::noise::low_passed::{density_above_motion, is_low_passed};
+use crate::noise::low_passed::{is_low_passed, largest_density_at_rest};
 use crate::noise::shared_band::{noise_above, shared_until};
 use crate::weak_form::weak_rows::Record;
 
@@ -28,7 +28,7 @@ impl BelowFilter {
             [true, false] => known.until = until(),
             [false, true] => {
                 if options.noise[1].is_none() {
-                    known.torque_noise[0] = quietest.max(density_above_motion(*angle, *torque, *weights));
+                    known.torque_noise[0] = quietest.max(largest_density_at_rest(*angle, *torque, *weights));
                 }
                 known.until = until();
             }

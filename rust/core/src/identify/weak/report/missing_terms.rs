@@ -192,10 +192,12 @@ impl Session<'_, '_, '_> {
         weak.rows.regressors.extend(more);
         let end = weak.rows.regressors.len();
         let followed = lag.map(|Followed { left, by }| {
-            let rate = &weak.rows.regressors[end - 1];
-            let value = rate.value.iter().zip(left).map(|(rate, left)| rate - left).collect();
-            let follows = Regressor { value, ..rate.clone() };
-            weak.rows.regressors.extend((!by.is_empty()).then_some(follows));
+            if !by.is_empty() {
+                let rate = &weak.rows.regressors[end - 1];
+                let value = rate.value.iter().zip(left).map(|(rate, left)| rate - left).collect();
+                let (companion, noise) = (rate.companion.clone(), rate.noise.clone());
+                weak.rows.regressors.push(Regressor { value, companion, noise });
+            }
             by
         });
         weak.rows.clear_unusable();
