@@ -104,37 +104,41 @@ def test_friction_that_drives_the_motion_is_never_offered() -> None:
     assert "friction of" not in advice
 
 
-@pytest.mark.slow
-def test_the_positioning_system_leads_to_what_was_published(folder_of_recordings: Path) -> None:
-    path = folder_of_recordings / "emps.mat"
+def positioning_system(folder: Path) -> tuple[Any, Any]:
+    """Give position and force of the positioning system EMPS."""
+    path = folder / "emps.mat"
     if not path.exists():
         pytest.skip("the recording emps.mat is missing")
     channels = recordings.read(path)
-    position, force = channels["qm"], channels["vir"] * float(channels["gtau"])
+    return channels["qm"], channels["vir"] * float(channels["gtau"])
+
+
+def assert_as_published(found: tvident.Identification) -> None:
+    """Compare with the published numbers, within 1 % and for damping 2 %."""
+    for name, published, part in (("inertia", 95.1089, 0.01), ("damping", 203.5034, 0.02), ("coulomb", 20.3935, 0.01)):
+        assert found.value(name).value == pytest.approx(published, rel=part), name
+
+
+@pytest.mark.slow
+def test_the_positioning_system_leads_to_what_was_published(folder_of_recordings: Path) -> None:
+    position, force = positioning_system(folder_of_recordings)
     result = tvident.identify(position, force, sample_rate=RATE)
     assert result.summary().startswith("do not trust: stiffness has both signs (")
     assert "early" not in " ".join(result.advice)
     assert "lag" not in result.advice[0]
     again = followed(result, position, force)
-    # The published numbers, within 1 % and for damping 2 %.
-    for name, published, part in (("inertia", 95.1089, 0.01), ("damping", 203.5034, 0.02), ("coulomb", 20.3935, 0.01)):
-        assert again.value(name).value == pytest.approx(published, rel=part), name
+    assert_as_published(again)
     assert not any("try" in line or "give inertia" in line or "lag=" in line for line in again.advice)
 
 
 @pytest.mark.slow
 def test_the_positioning_system_without_stiffness_leads_there_too(folder_of_recordings: Path) -> None:
     """With the inertia constant damping took over what that followed: 251 ± 19, where the advice had said 206."""
-    path = folder_of_recordings / "emps.mat"
-    if not path.exists():
-        pytest.skip("the recording emps.mat is missing")
-    channels = recordings.read(path)
-    position, force = channels["qm"], channels["vir"] * float(channels["gtau"])
+    position, force = positioning_system(folder_of_recordings)
     result = tvident.identify(position, force, sample_rate=RATE, stiffness=0)
     assert "inertia='constant', damping='constant'" in result.advice[0]
     again = followed(result, position, force, stiffness=0)
-    for name, published, part in (("inertia", 95.1089, 0.01), ("damping", 203.5034, 0.02), ("coulomb", 20.3935, 0.01)):
-        assert again.value(name).value == pytest.approx(published, rel=part), name
+    assert_as_published(again)
     assert not any(": try " in line for line in again.advice)
 
 

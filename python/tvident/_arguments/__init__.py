@@ -13,7 +13,7 @@ from tvident._arguments.arrays import (
 from tvident._arguments.channels import as_record, channel, channels
 from tvident._arguments.containers import fields_of, is_table, package_of, plain, time_axis
 from tvident._arguments.digits import explained_in_words, ordinal, own_digits, percent, to_digits_of, with_error
-from tvident._arguments.labelled import check_against_labels, implied_times, is_called_time
+from tvident._arguments.labelled import check_against_labels, implied_times, is_called_time, is_time
 from tvident._arguments.labels import Labels, labels_in, labels_of, labels_out
 from tvident._arguments.lost import check_no_lost_samples
 from tvident._arguments.numbers import (
@@ -84,6 +84,7 @@ __all__ = [
     "is_called_time",
     "is_read_as_it_is",
     "is_table",
+    "is_time",
     "is_word",
     "labels_in",
     "labels_of",

@@ -101,7 +101,7 @@ def _called_times(values: Any) -> tuple[npt.NDArray[np.float64], tuple[float, ..
         bare, unit = named_unit(name) if isinstance(name, str) else ("", "")
         unit = unit or unit_said(labels)
         is_numbers = getattr(getattr(labels, "dtype", None), "kind", "O") in "iuf"
-        if is_called_time(bare) and is_numbers and (not unit or is_convertible(ROTARY, "time", unit)):
+        if is_numbers and is_time(bare, unit):
             units = (factor_to(ROTARY, "time", unit, name="the time"),) if unit else _UNITS
             return np.asarray(labels, dtype=np.float64), units
     return np.empty(0), ()
@@ -110,3 +110,8 @@ def _called_times(values: Any) -> tuple[npt.NDArray[np.float64], tuple[float, ..
 def is_called_time(name: str) -> bool:
     """Return whether a name, without its unit, is what times are called."""
     return _CALLED.fullmatch(name) is not None
+
+
+def is_time(name: str, unit: str) -> bool:
+    """Return whether what is called so, in this unit or none, holds times."""
+    return is_called_time(name) and (not unit or is_convertible(ROTARY, "time", unit))

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from tvident import _arguments as arguments
 from tvident._figures.style import FOUND, MUTED, Place, draw_line, panels, plain, style
 from tvident._simulate import Recording
-from tvident._units import ROTARY, Channel, is_convertible, named_unit, times_in_seconds, unit_said, with_unit
+from tvident._units import Channel, named_unit, times_in_seconds, unit_said, with_unit
 
 
 def plot_recording(
@@ -88,8 +88,7 @@ def plot_recording(
 def _is_time(full: str, values: npt.NDArray[Any]) -> bool:
     """Return whether a channel is called as times are, in a unit of time or none. A torque may be called t, but decreases."""
     name, unit = (one.strip() for one in named_unit(full))
-    is_called = arguments.is_called_time(name) and (not unit or is_convertible(ROTARY, "time", unit))
-    return is_called and (name.lower() == "time" or not (values[1:] < values[:-1]).any())
+    return arguments.is_time(name, unit) and (name.lower() == "time" or not (values[1:] < values[:-1]).any())
 
 
 def _time(channels: dict[str, npt.NDArray[Any]], sample_rate: float | None) -> npt.NDArray[np.float64]:

@@ -16,7 +16,7 @@ from tvident._files.unpacked import ending_of
 if TYPE_CHECKING:
     from tvident._files.beginnings import ending_by
     from tvident._files.rates import other_rate
-    from tvident._files.recorded import FileRecording, increasing_times, is_time, read_recording, time_channels
+    from tvident._files.recorded import FileRecording, increasing_times, read_recording, time_channels
     from tvident._files.recordings import read
     from tvident._files.stated import stated_rate
     from tvident._files.text import copy_text
@@ -39,7 +39,6 @@ __all__ = [
     "errors_name",
     "full_name",
     "increasing_times",
-    "is_time",
     "keeps_result",
     "listed",
     "other_rate",
@@ -64,7 +63,6 @@ _READERS = {
     "other_rate": "rates",
     "FileRecording": "recorded",
     "increasing_times": "recorded",
-    "is_time": "recorded",
     "read_recording": "recorded",
     "time_channels": "recorded",
     "read": "recordings",

@@ -208,9 +208,9 @@ class FileRecording(Mapping[str, Channel]):
         select : a part by time.
         """
         long = {name: values for name, values in self._channels.items() if values.ndim == 1 and values.size > 1}
-        found = [name for name, values in long.items() if is_time(name, values.unit)]
+        found = [name for name, values in long.items() if arguments.is_time(name, values.unit)]
         # Structures and groups put their names before those of their channels.
-        grouped = [name for name, values in long.items() if is_time(name.rpartition(".")[2], values.unit)]
+        grouped = [name for name, values in long.items() if arguments.is_time(name.rpartition(".")[2], values.unit)]
         called = found[:1] or (grouped if len(grouped) == 1 else increasing_times(long))
         # Groups that were sampled together have one clock.
         called = called[:1] if all(np.array_equal(long[called[0]], long[name]) for name in called[1:]) else called
@@ -310,14 +310,6 @@ def _check_no_counts(time: npt.NDArray[np.float64]) -> None:
                 f"the first, {time[0]:.5g}, would be of the year {time[0] / _YEAR + 1970:.0f} if it were seconds; call the channel "
                 f"'time [{unit}]', or give t= and time_unit='{unit}', if it counts {word} since 1970"
             )
-
-
-def is_time(name: str, unit: str) -> bool:
-    """Return whether a channel of this name, with this unit or none, holds the times of samples."""
-    known = unit_of(unit)
-    return arguments.is_called_time(name) and (
-        not unit or (known is not None and known.dimension == ROTARY.dimensions["time"])
-    )
 
 
 def read_recording(path: str | Path) -> FileRecording:

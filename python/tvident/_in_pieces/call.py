@@ -15,7 +15,7 @@ from tvident import _arguments as arguments
 from tvident import _core
 from tvident._choices import VERSION
 from tvident._equation import GivenTerm
-from tvident._files import FileError, FileWarning, check_apart, ending_of, full_name, is_time, other_rate
+from tvident._files import FileError, FileWarning, check_apart, ending_of, full_name, other_rate
 from tvident._identify import Method
 from tvident._in_pieces.copied import copied
 from tvident._in_pieces.found import FileIdentification
@@ -253,7 +253,7 @@ def _recording(
     if not samples:
         raise ValueError(f"a recording must hold samples; {source.place} has none; check it")
     axis = units_of(angle_says, torque_says, *units)
-    times = [one for one in source.channels if is_time(*named_unit(one))]
+    times = [one for one in source.channels if arguments.is_time(*named_unit(one))]
     delta, rate = rates
     if delta is not None or rate is not None:
         if names[2] is not None:

@@ -53,8 +53,7 @@ def write_page(
         raise TypeError(
             f"channels must be a mapping of names to samples; got {arguments.shown(channels)}; write {{'force [N]': samples}}, say"
         )
-    if not isinstance(title, str | None):
-        raise TypeError(f"title must be text; got {arguments.shown(title)}; write it in quotes")
+    check_title(title)
     result, drawn = page.result, list(recorded)
     step, samples = int(result.settings["step"]), max((one.values.size for one in recorded), default=None)
     for name, values in (channels or {}).items():
@@ -68,7 +67,13 @@ def write_page(
             )
         bare, unit = named_unit(name)
         drawn.append(series_of(result, bare, "", numbers, unit=unit or unit_said(values)))
-    write_report(path, page, drawn, title or Path(path).stem)
+    write_report(path, page, drawn, title)
+
+
+def check_title(title: str | None) -> None:
+    """Refuse a title that is no text."""
+    if not isinstance(title, str | None):
+        raise TypeError(f"title must be text; got {arguments.shown(title)}; write it in quotes")
 
 
 def samples_shown(value: Any, rate: float) -> str:

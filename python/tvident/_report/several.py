@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -79,21 +79,22 @@ def content_of_list(shown: ShownList, title: str) -> tuple[dict[str, Any], list[
     lengths = [one["span"][1] - one["span"][0] for one in parts]
     first = begins[0] if is_together else 0.0
     clock = "" if is_together else "; times of the plots count from the beginning of each"
+    worst = min((one["tone"] for one in parts), key=_WORST_FIRST.index)
     content = parts[0] | {
-        "verdict": _verdict(parts, shown.advice),
-        "tone": min((one["tone"] for one in parts), key=_WORST_FIRST.index) if not shown.advice else "bad",
+        "verdict": _verdict(parts, worst, shown.advice),
+        "tone": "bad" if shown.advice else worst,
         "span": [first, first + max(lengths)],
         "facts": f"{_counted(len(parts))} of {_range(lengths)} s{clock}",
         "numbers": numbers,
-        "advice": [*shown.advice, *_of_each(parts, "advice")],
+        "advice": [*shown.advice, *_of_each(parts, "advice", _sentence)],
         "warnings": [
             _warning(number, one, 0.0 if is_together else begins[number])
             for number, part in enumerate(parts)
             for one in _warned(part)
         ],
         "jumps": [],
-        "reasons": _of_each(parts, "reasons"),
-        "settings": _settings(parts),
+        "reasons": _of_each(parts, "reasons", _sentence),
+        "settings": _of_each(parts, "settings", _setting),
         "repeat": "",
         "summary": shown.summary,
         "charts": charts,
@@ -101,9 +102,8 @@ def content_of_list(shown: ShownList, title: str) -> tuple[dict[str, Any], list[
     return content, series
 
 
-def _verdict(parts: Sequence[Mapping[str, Any]], shared: Sequence[str]) -> str:
+def _verdict(parts: Sequence[Mapping[str, Any]], worst: str, shared: Sequence[str]) -> str:
     """Return the verdict of the worst record, and how many are as bad; first what is wrong with what is shared, unless one explains it."""
-    worst = min((one["tone"] for one in parts), key=_WORST_FIRST.index)
     places = [place for place, one in enumerate(parts) if one["tone"] == worst]
     said = [] if worst == "bad" else [one.partition(": ")[0] for one in shared]
     if worst == "good":
@@ -112,7 +112,7 @@ def _verdict(parts: Sequence[Mapping[str, Any]], shared: Sequence[str]) -> str:
         which = f" ({arguments.listed([str(one) for one in places])})" if len(places) > 1 else ""
         word = "not to be trusted" if worst == "bad" else "to be looked at"
         said.append(f"{len(places)} of {_counted(len(parts))} {word}{which}")
-    return "; ".join([*said, f"record {places[0]}: {parts[places[0]]['verdict']}"])
+    return "; ".join([*said, _sentence(places[0], parts[places[0]]["verdict"])])
 
 
 def _counted(records: int) -> str:
@@ -124,22 +124,19 @@ def _range(lengths: Sequence[float]) -> str:
     return " to ".join(dict.fromkeys(f"{one:.4g}" for one in (min(lengths), max(lengths))))
 
 
-def _of_each(parts: Sequence[Mapping[str, Any]], name: str) -> list[str]:
-    """Return sentences, once where they are of all records, and else with the number of theirs."""
+def _of_each(parts: Sequence[Mapping[str, Any]], name: str, of_record: Callable[[int, Any], Any]) -> list[Any]:
+    """Return what stands under a name, once where it is of all records, and else with the number of theirs."""
     every = [line for line in parts[0][name] if all(line in one[name] for one in parts)]
-    own = [f"record {number}: {line}" for number, one in enumerate(parts) for line in one[name] if line not in every]
+    own = [of_record(number, line) for number, one in enumerate(parts) for line in one[name] if line not in every]
     return [*every, *own]
 
 
-def _settings(parts: Sequence[Mapping[str, Any]]) -> list[list[str]]:
-    every = [row for row in parts[0]["settings"] if all(row in one["settings"] for one in parts)]
-    own = [
-        [f"Record {number}: {row[0]}", row[1]]
-        for number, one in enumerate(parts)
-        for row in one["settings"]
-        if row not in every
-    ]
-    return [*every, *own]
+def _sentence(number: int, line: str) -> str:
+    return f"record {number}: {line}"
+
+
+def _setting(number: int, row: list[str]) -> list[str]:
+    return [f"Record {number}: {row[0]}", row[1]]
 
 
 def _warned(part: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -154,7 +151,7 @@ def _warned(part: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _warning(number: int, one: dict[str, Any], begin: float) -> dict[str, Any]:
     times = [[start - begin, end - begin] for start, end in one["times"]]
-    return one | {"words": f"record {number}: {one['words']}", "times": times}
+    return one | {"words": _sentence(number, one["words"]), "times": times}
 
 
 def _moved(chart: dict[str, Any], by: int, number: int) -> dict[str, Any]:

@@ -40,21 +40,24 @@ def _plotly(place: Path) -> str:
     return text_of(place.read_bytes(), level=4, strategy=0)
 
 
-def write_report(path: str | Path, shown: ShownResult, recorded: list[Series], title: str) -> None:
+def write_report(path: str | Path, shown: ShownResult, recorded: list[Series], title: str | None) -> None:
     """Write a page that shows a result, its channels, and recorded and predicted torque; it appears whole or not at all."""
     _write(path, lambda shortened: content_of(shown, recorded, shortened), title)
 
 
 def write_list(path: str | Path, shown: ShownList, title: str | None) -> None:
     """Write a page that shows several records, one after the other."""
-    _write(path, lambda shortened: content_of_list(shown, shortened), title or Path(path).stem)
+    _write(path, lambda shortened: content_of_list(shown, shortened), title)
 
 
-def _write(path: str | Path, content_in: Callable[[str], tuple[dict[str, Any], list[Series]]], title: str) -> None:
+def _write(
+    path: str | Path, content_in: Callable[[str], tuple[dict[str, Any], list[Series]]], title: str | None
+) -> None:
+    """Write a page whose content follows from its title, by default the name of the file."""
     place = check_plotly()
     with ThreadPoolExecutor(1) as beside:
         plotly = beside.submit(_plotly, place)
-        content, series = content_in(printable(title, _LONGEST_TITLE))
+        content, series = content_in(printable(title or Path(path).stem, _LONGEST_TITLE))
         parts = packed(series)
         pieces = _pieces(content, parts, plotly.result())
     with replaced(Path(path)) as file:

@@ -9,7 +9,6 @@ from typing import Any, TypeAlias
 
 import numpy.typing as npt
 
-from tvident import _arguments as arguments
 from tvident import _report
 from tvident._equation import COEFFICIENTS
 from tvident._results.recorded import Recorded
@@ -52,8 +51,7 @@ def report_list(
     """Write one report of several records that were identified together."""
     _report.check_page(path)
     _report.check_count(len(records))
-    if not isinstance(title, str | None):
-        raise TypeError(f"title must be text; got {arguments.shown(title)}; write it in quotes")
+    _report.check_title(title)
     shown = [_shown(record, record._recorded, str) for record in records]  # noqa: SLF001 - of this room
     _report.write_list(path, _report.ShownList(shown, shared, advice, summary), title)
 
