@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,7 +16,19 @@ from tvident._identify.remedies import Trial
 AUTOMATIC = {"inertia": "auto", "damping": "auto", "stiffness": "windowed"}
 
 
-def tried(suspects: list[str], *, there: set[str], beyond_chance: list[str]) -> list[list[str]]:
+class LeavingSomething(Trial):
+    """A trial in which every equation leaves something to explain, and a machine that can be."""
+
+    def _leaves_nothing(self, *_: object) -> bool:
+        return False
+
+    def _feeds_energy(self, *_: object) -> bool:
+        return False
+
+
+def tried(
+    suspects: list[str], *, there: set[str], beyond_chance: list[str], undoubted: Collection[str] = ()
+) -> list[list[str]]:
     """Return what is tried beside constants, and what beside parameters that change; some terms are there beside constants."""
     stages: dict[str, list[str]] = {"constant": [], "auto": []}
 
@@ -25,16 +38,16 @@ def tried(suspects: list[str], *, there: set[str], beyond_chance: list[str]) -> 
         stages[given["damping"]].append(change)
         is_there = change in there and given["damping"] == "constant"
         return SimpleNamespace(
-            record_status=Status.TERM_SUSPECTED,
+            record_status=Status(0) if change in undoubted else Status.TERM_SUSPECTED,
             settings={"lag": 1.0 if is_there else 0.0, "lag_stderr": 0.1},
             value=lambda name: (1.0, 0.1) if name == change and is_there else (0.0, 0.1),
         )
 
     kinds = {"inertia": "constant", "damping": "varying", "stiffness": "windowed"}
     result: Any = SimpleNamespace(settings={"kinds": kinds, "lag": 0.0})
-    trial = Trial(identify, result, AUTOMATIC, ["offset"], suspects, beyond_chance=beyond_chance)
-    for _ in trial._each_beside_changes():  # noqa: SLF001 - what is tried is the test
-        pass
+    trial = LeavingSomething(identify, result, AUTOMATIC, ["offset"], suspects, beyond_chance=beyond_chance)
+    first, again = (list(trial._each_beside_changes()) for _ in range(2))  # noqa: SLF001 - what is tried is the test
+    assert first == again
     return list(stages.values())
 
 
@@ -43,6 +56,13 @@ def test_all_are_tried_beside_constants_and_few_beside_what_changes() -> None:
     assert tried(suspects, there=set(), beyond_chance=["cubic"]) == [suspects, ["cubic", "lag"]]
     assert tried(suspects, there={"coulomb"}, beyond_chance=[]) == [suspects, ["lag", "coulomb"]]
     assert tried(suspects, there={"lag", "preload"}, beyond_chance=["preload"]) == [suspects, ["lag", "preload"]]
+
+
+def test_nothing_is_tried_beside_what_changes_where_nothing_contradicts_an_equation_beside_constants() -> None:
+    both = ["coulomb", "lag"]
+    assert tried(both, there={"coulomb"}, beyond_chance=["coulomb"], undoubted={"coulomb"}) == [both, []]
+    # One that is not there, or that something contradicts, settles nothing.
+    assert tried(both, there={"lag"}, beyond_chance=["coulomb"], undoubted={"coulomb"}) == [both, both]
 
 
 def test_friction_that_drives_the_motion_is_none() -> None:

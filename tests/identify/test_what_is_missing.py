@@ -240,7 +240,7 @@ def test_numbers_in_advice_are_those_that_the_better_equation_finds(tried: list[
 
 @pytest.mark.slow
 def test_a_part_of_a_long_record_tells_what_is_missing() -> None:
-    """Trials take the busiest 33 000 of 70 000 samples; the part that is at rest tells nothing."""
+    """Trials take the busiest 16 384 of 70 000 samples; the part that is at rest tells nothing."""
     angle, torque = record(5, friction=0.1, seconds=70)
     found = tvident.identify(angle, torque, sample_rate=RATE)
     assert found.advice[0].startswith("dry friction of 0.09")

@@ -70,7 +70,8 @@ class Plausible:
     def _far(self, angle: npt.NDArray[np.number]) -> list[str]:
         if "angle" not in self.axis.assumed or self.axis.system is not ROTARY:
             return []
-        finite = angle[np.isfinite(angle)].astype(np.float64)
+        is_finite = np.isfinite(angle)
+        finite = angle if is_finite.all() else angle[is_finite]
         if not finite.size:
             return []
         least, most = float(finite.min()), float(finite.max())

@@ -37,8 +37,14 @@ _TESTED = {"inertia": "auto", "damping": "auto", "stiffness": "windowed"}
 _MOST = 1 << 14
 """Samples in the middle of a record that are tried in weak form."""
 
-_PART, _FUNCTIONS = 1 << 15, 64
-"""Samples, and test functions, that tell what is missing: records twice as long are tried on a part."""
+_PART, _FUNCTIONS = 1 << 14, 64
+"""Samples, and test functions, that tell what is missing."""
+
+_LONG = 1 << 16
+"""Samples from which on a record is tried on a part of it."""
+
+_READ = 1 << 11
+"""Samples of a part that tell how busy it is."""
 
 _MUCH_BETTER = 0.1
 """Swapped channels leave at most this part of what is unpredicted."""
@@ -169,7 +175,8 @@ def _busiest(torque: Any, length: int) -> slice:
     parts = [slice(first, first + length) for first in range(0, torque.size - length + 1, length)]
 
     def spread(part: slice) -> float:
-        there = torque[part][np.isfinite(torque[part])]
+        some = torque[part][:: max(1, length // _READ)]
+        there = some[np.isfinite(some)]
         # Half a part that is missing tells half as much.
         return float(np.subtract(*np.percentile(there, [75, 25]))) * there.size if there.size else 0.0
 
@@ -223,15 +230,13 @@ class Improvement(_AskedOfRecord):
     def _without_worse_offset(self, result: Identification, words: Words) -> Words:
         terms = [*(term for term in self.asked_terms if term != OFFSET), (OFFSET, "windowed")]
         with_offset = partial(self._identify, self.data, **self.given, terms=terms, lag=self.request.lag)
-        return without_worse_offset(words, result, with_offset) if self.data.time.size < 2 * _PART else words
+        return without_worse_offset(words, result, with_offset) if self.data.time.size < _LONG else words
 
     def _trial(self, result: Identification) -> Trial:
         """Return the trial of the record, or of its busiest part where that tells as much."""
-        data, length = self.data, result.settings["window_length"]
-        part = max(_PART, _FUNCTIONS * length) if isinstance(length, int) else _PART
+        data, some = self.data, self._busiest_part
         beyond_chance = [one.name for one in self._explained.suspects]
-        if data.is_plain and data.time.size >= 2 * part:
-            some = _busiest(data.torques, part)
+        if some is not None:
             given = {name: kind if isinstance(kind, str) else cut(kind, some) for name, kind in self.given.items()}
             identify = partial(self._identify, data.stretch(some))
             try:
@@ -244,6 +249,13 @@ class Improvement(_AskedOfRecord):
                 return Trial(identify, found, given, self.asked_terms, self._suspects, is_as_asked, beyond_chance)
         again = partial(self._identify, data)
         return Trial(again, result, self.given, self.asked_terms, self._suspects, self._is_as_asked, beyond_chance)
+
+    @cached_property
+    def _busiest_part(self) -> slice | None:
+        """The part of a long record that tells as much of its equation as the whole; None of other records."""
+        part = max(_PART, _FUNCTIONS * (self.found.window_length or 0))
+        is_long = self.data.is_plain and self.data.time.size >= max(_LONG, 2 * part)
+        return _busiest(self.data.torques, part) if is_long else None
 
     @property
     def _is_as_asked(self) -> bool:
@@ -270,16 +282,17 @@ class Improvement(_AskedOfRecord):
             data, angles=data.torques, torques=data.angles, passed=data.passed[::-1], labels=None, doubts=(), step=1
         )
 
-        def exchanged(stiffness: str) -> Identification:
+        def exchanged(stiffness: str, some: Data) -> Identification:
             kinds = {"inertia": "constant", "damping": "constant", "stiffness": stiffness}
             request = resolve(WeakForm(), {**kinds, "terms": [OFFSET], "lag": 0.0}, None, 1 / data.period)
-            return self.run(request, channels, diagnose=False)
+            return self.run(request, some, diagnose=False)
 
+        part = self._busiest_part
         try:
             # Where constants alone predict nothing of it nothing is swapped, and to look for all that may change there takes long.
-            if not unexplained(exchanged("constant")).share < 1:
+            if not unexplained(exchanged("constant", channels if part is None else channels.stretch(part))).share < 1:
                 return None
-            found = exchanged("windowed")
+            found = exchanged("windowed", channels)
         except ValueError:
             return None
         left = unexplained(found).share

@@ -106,7 +106,8 @@ class Trial:
         is_settled = of_constants is not None and of_constants.is_settled
         beside = steady = None
         if is_changing and not is_settled:
-            beside, steady = self._beside_changes(), self._beside_constant_stiffness()
+            beside = self._beside_changes()
+            steady = None if self._needs_no_changes else self._beside_constant_stiffness()
         # The simpler ones come first.
         tried = [one for one in (steady, of_constants, beside) if one is not None]
         least = min((one.ratio for one in tried), default=np.inf)
@@ -214,13 +215,16 @@ class Trial:
 
         Inertia and damping that may change take the place of what is missing, so they change beside it only where they were found to,
         and where that explains more. Then a term is tried only if the result says so, which changes as much, or if it is there beside
-        constants: that takes longest of all. A lag is followed by whatever changes, so it always is.
+        constants: that takes longest of all. A lag is followed by whatever changes, so it always is. Where nothing contradicts an
+        equation beside constants, nothing changes beside it.
         """
         call = self._of_constants_alone
         constant = {name: call[name] if name != "stiffness" else kind for name, kind in self.given.items()}
         found = self.result.settings["kinds"]
         may_change = any(found[name] == "varying" and constant[name] != self.given[name] for name in COEFFICIENTS)
         for place, kinds in enumerate([constant, self.given] if may_change else [constant]):
+            if place and self._needs_no_changes:
+                return
             if place not in self._beside:
                 there = [one for one, result in self._beside.get(0, {}).items() if is_there(one, result)]
                 worth = {"lag", *self.beyond_chance, *there}
@@ -240,6 +244,12 @@ class Trial:
                 if self._leaves_nothing(found, _ENOUGH) and self._may_be(one, found):
                     break
         return tried
+
+    @property
+    def _needs_no_changes(self) -> bool:
+        """Whether nothing contradicts an equation that was tried beside constants, with a suspect that can be."""
+        tried = self._beside.get(0, {})
+        return any(not found.record_status & _CONTRADICTED and self._may_be(one, found) for one, found in tried.items())
 
     def _leaves_nothing(self, found: Identification, most: float = NEARLY_ALL) -> bool:
         """Return whether nothing that an equation mends contradicts a result, and it leaves at most so much of what was left."""
