@@ -1,5 +1,6 @@
 //! Statistical inference: cross-validation, tests of constancy, jumps, identifiability, missing terms and whether anything is explained.
 
+pub(crate) mod bandwidths;
 pub(crate) mod constancy;
 pub(crate) mod cross_validation;
 pub(crate) mod drive;

@@ -11,6 +11,7 @@ use std::ops::Range;
 use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::exec::stages::Stages;
+use crate::inference::bandwidths::{outward, within};
 use crate::inference::constancy::BLOCKS;
 use crate::inference::cross_validation::{ComparedRows, best_length, rule_out};
 use crate::inference::slow_curve::Varying;
@@ -23,17 +24,16 @@ use crate::regression::subsample::{few_stretches, places_of, thinned_column, thi
 use crate::regression::window_length::Scale;
 use crate::simd::instructions::Instructions;
 
-/// Bandwidths tried, as multiples of the neighbourhood that a prediction leaves out.
-const REACHES: [f64; 10] = [1.6, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 23.0, 32.0];
-
 /// The part of the record, or of its shortest stretch between jumps, that windows span at most: one whose parts are told to differ is followed
 /// from part to part.
 const STRETCH: usize = BLOCKS;
 
 /// Rounds of estimating the slow coefficients, each starting from the last one's result.
 const ROUNDS: usize = 3;
-/// So many bandwidths in a row that are no better end the search for better ones around the last round's.
-const NO_BETTER: usize = 2;
+/// A round is the last that chooses the same and changes the error by no more than this part.
+const SETTLED: f64 = 2e-3;
+/// So many lengths of windows on either side of the one that was best a round before are tried first.
+const NEAR: usize = 2;
 
 /// The slow coefficients found.
 #[derive(Clone, Debug)]
@@ -98,15 +98,27 @@ impl FewRows {
 }
 
 impl SlowSearch<'_> {
-    /// The length of windows that predicts best what slow coefficients leave, and its error. A few rows rule out most lengths.
+    /// The length of windows that predicts best what slow coefficients leave, and its error. Lengths near the best one of the round before are tried
+    /// first, and a few rows rule out most of all.
     fn best_length(
         &self,
         problem: &Problem<'_>,
-        rest: &Model,
+        (rest, before): (&Model, Option<Scale>),
         few: &mut Option<FewRows>,
         stages: &mut Stages<'_, '_>,
     ) -> Result<Option<(Scale, f64)>, Error> {
         let &Self { noise, expected, scales, instructions, .. } = self;
+        if let Some(place) = before.and_then(|before| scales.iter().position(|one| *one == before)) {
+            let near = place.saturating_sub(NEAR)..(place + NEAR + 1).min(scales.len());
+            let found = best_length(problem, (scales, &scales[near.clone()]), expected, instructions, stages)?;
+            let is_inside = |(best, _): &(Scale, f64)| {
+                let is_end = |end: usize| scales.get(end).is_some_and(|one| one == best);
+                !(near.start > 0 && is_end(near.start) || near.end < scales.len() && is_end(near.end - 1))
+            };
+            if found.as_ref().is_some_and(is_inside) {
+                return Ok(found);
+            }
+        }
         let left = match few {
             Some(FewRows { rows, stretches, held }) => {
                 rows.rhs = thinned_column(problem.rhs, stretches);
@@ -159,11 +171,6 @@ fn hole(scale: Scale) -> f64 {
     (scale.span() / 2 + scale.reach) as f64
 }
 
-/// Bandwidths that fit into so many rows.
-fn reaches(scale: Scale, whole: f64) -> Vec<f64> {
-    REACHES.iter().map(|multiple| multiple * hole(scale)).take_while(|reach| 2.0 * reach <= whole).collect()
-}
-
 /// Estimates slow coefficients, or returns `None` if they are not determined. `first` is the length of windows to begin with.
 pub(crate) fn find(
     search: &SlowSearch<'_>,
@@ -203,9 +210,10 @@ pub(crate) fn find(
         let weights = if current.is_some() { &fit.pooled.weights } else { &ones };
         let companions = slow.iter().map(|&one| rows.regressors[one].companion.as_slice()).collect();
         let equations = Slow { fit: &fit, coefficients, companions, current, weights, rows: rows.len(), breaks };
-        let reaches = reaches(scale, whole);
+        let reaches = within(hole(scale), whole);
         let best = search.best_curve(&equations, &problem, (scale, compares), (&reaches, last));
         let Some(BestCurve { terms, curves: [leave_gap_out, varying], reach, excess }) = best else { return Ok(None) };
+        let reach = reach.min(whole / 2.0);
         last = (terms > 1).then_some(reach);
         if last.is_some() && last == reaches.first().copied() {
             // Shorter bandwidths need shorter windows.
@@ -215,10 +223,17 @@ pub(crate) fn find(
         let taken = varying.levels(slow);
         let rest = Model { taken: taken.clone(), ..rest.clone() };
         let problem = rest.problem(rows, &rhs, noise, None);
-        let Some((best, error)) = search.best_length(&problem, &rest, &mut few, stages)? else { return Ok(None) };
+        let before = found.as_ref().map(|found| found.scale);
+        let best = search.best_length(&problem, (&rest, before), &mut few, stages)?;
+        let Some((best, error)) = best else { return Ok(None) };
         let error = error - excess;
+        let is_settled = found.as_ref().is_some_and(|found| {
+            let chosen = (found.scale, found.equations_of, found.reach, found.terms);
+            chosen == (best, scale, reach, terms) && (error - found.error).abs() <= SETTLED * error
+        });
+        let is_last = round == ROUNDS || is_settled;
         let mut predicted = error;
-        if round == ROUNDS && !rows.jumps.is_empty() {
+        if is_last && !rows.jumps.is_empty() {
             let rhs = without(rows, &rows.rhs, slow, &leave_gap_out);
             let problem = rest.problem(rows, &rhs, noise, None);
             let fit = Fit::with_leave_gap_out(&problem, best, expected, instructions, stages)?;
@@ -226,7 +241,6 @@ pub(crate) fn find(
             predicted =
                 fit.map_or(f64::INFINITY, |fit| compared.error(&problem, best, &fit, expected.variance)) - excess;
         }
-        let reach = reach.min(whole / 2.0);
         found = Some(SlowCoefficients {
             varying,
             rhs,
@@ -238,27 +252,12 @@ pub(crate) fn find(
             reach,
             terms,
         });
+        if is_last {
+            break;
+        }
         scale = shortened(best, most);
     }
     Ok(found)
-}
-
-/// Tries bandwidths in ascending order, or outward from the last round's in both directions until they get no better.
-fn outward(reaches: &[f64], last: Option<f64>, mut is_better: impl FnMut(f64) -> bool) {
-    let last = last.unwrap_or(f64::NEG_INFINITY);
-    let most = if last.is_finite() { NO_BETTER } else { usize::MAX };
-    let (below, above) = reaches.split_at(reaches.partition_point(|&reach| reach < last));
-    let mut walk = |reaches: &mut dyn Iterator<Item = &f64>| {
-        let mut worse = 0;
-        for &reach in reaches {
-            worse = if is_better(reach) { 0 } else { worse + 1 };
-            if worse == most {
-                return;
-            }
-        }
-    };
-    walk(&mut above.iter());
-    walk(&mut below.iter().rev());
 }
 
 /// What slow coefficients would follow of another right-hand side with the bandwidth that was found, or `None` if they are not determined.

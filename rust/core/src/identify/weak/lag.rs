@@ -166,6 +166,10 @@ impl Session<'_, '_, '_> {
             let one = beside.as_ref().map_or(&chosen, |(one, _)| one);
             let constant = self.fit_first(one, model)?;
             let Some(found) = self.find_lag(one, &constant)? else { break };
+            if beside.is_some() && (found.value - self.record.lag).abs() <= CHOSEN * found.error {
+                // The same would be decided.
+                break;
+            }
             self.record.lag = found.value;
             let mut one = self.choose(model)?;
             let again = self.decide(&mut one, model)?;
