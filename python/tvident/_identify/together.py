@@ -142,7 +142,14 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
         If there is no sample period, or arrays hold no numbers.
     """
     # A room of many files, which calls with one trial of one mass need not wait for.
-    from tvident._merged import AskedTogether, Earlier, identify_masses, identify_trials  # noqa: PLC0415
+    from tvident._merged import (  # noqa: PLC0415
+        AskedTogether,
+        Earlier,
+        identify_masses,
+        identify_trials,
+        masses_over_gaps,
+        trials_over_gaps,
+    )
 
     _check(angle, options)
     for name, one in (("ensemble_axis", options.ensemble_axis), ("dof_axis", options.dof_axis)):
@@ -179,10 +186,15 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
             report=report,
         )
         values = _Terms(terms, sampling.period, asked.workers)
+        if sampling.clock is not None:
+            if trials is not None:
+                return identify_trials(trials.on_grid(sampling), asked, values)
+            return identify_masses([one.on_grid(sampling) for one in masses], asked, values)
         if trials is not None:
-            return identify_trials(trials if sampling.clock is None else trials.on_grid(sampling), asked, values)
-        on_grid = masses if sampling.clock is None else [one.on_grid(sampling) for one in masses]
-        return identify_masses(on_grid, asked, values)
+            whole, bridges = trials_over_gaps(trials, options.settings, asked.workers)
+            return identify_trials(whole, asked.bridged(bridges), values)
+        joint, bridges = masses_over_gaps(masses, options.settings, asked.workers)
+        return identify_masses(joint, asked.bridged(bridges), values)
 
 
 def _trials(angle: Any, torque: Any, options: Options, axis: Axis) -> tuple[Trials, list[Masses]]:

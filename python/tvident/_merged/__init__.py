@@ -1,5 +1,6 @@
 """Identifies what repeated trials or coupled masses share, from rows that are merged."""
 
+from tvident._merged.bridges import masses_over_gaps, trials_over_gaps
 from tvident._merged.call import AskedTogether, identify_trials
 from tvident._merged.earlier import Earlier
 from tvident._merged.loaded import load
@@ -27,7 +28,9 @@ __all__ = [
     "identify_trials",
     "load",
     "masses_of",
+    "masses_over_gaps",
     "of_core",
     "trials_of",
+    "trials_over_gaps",
     "weights_of_trials",
 ]

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
+from tvident._clocks import Timed
 from tvident._equation import COEFFICIENTS, Term
 from tvident._merged.earlier import Earlier
 from tvident._merged.elements import Element, kind_or_number
@@ -77,25 +79,30 @@ class AskedTogether:
         samples: int,
         noise: tuple[list[float], list[float]] | None = None,
         place: int = 0,
+        *,
+        is_white: bool = True,
     ) -> Part:
         """Call the core; the noise is that of every angle and every torque, as variances, where it is not to be estimated.
 
-        The place is that of the part among those that share no unknown.
+        The place is that of the part among those that share no unknown. Noise that may not be white is asked for its colour first, as the
+        core reads that with the variance alone.
         """
         asked = self.forms[min(place, len(self.forms) - 1)]
-        found = _core.identify_merged(
+        identified = partial(
+            _core.identify_merged,
             list(equations.trials),
             [element.given() for element in equations.elements],
             samples,
             delta=self.sampling.period,
-            noise=noise,
             window_length=asked["window_length"],
             exponent=asked["exponent"],
             regression_window=asked["regression_window"],
             step=self.step,
             workers=self.workers,
-            progress=self.report,
         )
+        found = None if is_white else identified(noise=None, progress=None)
+        if found is None or max(found.colours, default=1.0) <= 1:
+            found = identified(noise=noise, progress=self.report)
         self._check_window(asked["regression_window"], found.regression_window)
         # Nothing was determined: no window was long enough.
         again = replace(self, forms=[{name: getattr(found, name) or None for name in asked}], report=None)
@@ -114,6 +121,10 @@ class AskedTogether:
             f"regression_window must be {bound} about {nearest} samples here, since windows are compared with equations that share no "
             f"samples with them; got {wanted}; use {nearest} or {cure}, or leave it out"
         )
+
+    def bridged(self, bridges: Timed | None) -> AskedTogether:
+        """Return the same with how short gaps were bridged, if any were."""
+        return replace(self, sampling=replace(self.sampling, bridges=bridges))
 
     def as_before(self, elements: Sequence[Element], given: frozenset[str] = frozenset()) -> list[Element]:
         """Return elements as an earlier result found them, but for those of which something is given now."""
@@ -147,13 +158,13 @@ def identify_trials(trials: Trials, asked: AskedTogether, term_values: TermValue
         position = None if trials.positions is None else np.ascontiguousarray(trials.positions[place])
         weights = None if trials.weights is None else trials.weights[place]
         given.append((angle[np.newaxis], torque[np.newaxis], terms, mask, position, weights))
-    passed, noise = asked.sampling.passed, None
+    passed, noise = asked.sampling.passed, trials.noise
     if passed is not None:
         angles, torques = ([float(np.mean(variances(one, passed)))] for one in (trials.angles, trials.torques))
         noise = angles, torques
     merging = Merging(
         elements,
-        [asked.part(Equations(elements, [0], given), trials.samples, noise)],
+        [asked.part(Equations(elements, [0], given), trials.samples, noise, is_white=trials.noise is None)],
         sampling=asked.sampling,
         step=asked.step,
         samples=trials.samples,

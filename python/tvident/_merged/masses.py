@@ -48,6 +48,8 @@ class Masses:
         Of a mechanism: terms before those that were asked for.
     inertia : mapping of str to ndarray, shape (masses, masses, n)
         Of a mechanism: by how much factors enter the matrix of inertia.
+    variances : sequence of float, optional
+        Of the noise of the angles, then of the torques, where bridging gaps changed it.
     """
 
     angles: Sequence[Numbers]
@@ -58,6 +60,7 @@ class Masses:
     forces: Sequence[npt.NDArray[np.float64]] = ()
     weights: npt.NDArray[np.float64] | None = None
     inertia: Mapping[str, npt.NDArray[np.float64]] = field(default_factory=dict)
+    variances: Sequence[float] | None = None
 
     @property
     def count(self) -> int:
@@ -117,12 +120,16 @@ class Masses:
 
         That of momenta is not known, and smoothness says nothing of it: they are functions of smooth velocities.
         """
-        if not self.momenta and passed is None:
+        if self.variances is not None:
+            known = list(self.variances[: len(self.angles)])
+            torques = [self.variances[len(self.angles) + one] for one in equations]
+        elif self.momenta or passed is not None:
+            of_weight_one = 1 / spread(self.weights)
+            known = [one * of_weight_one for one in variances(self.angles, passed)]
+            measured = variances([np.asarray(self.torques[one]) for one in equations], passed)
+            torques = [one * of_weight_one for one in measured]
+        else:
             return None
-        of_weight_one = 1 / spread(self.weights)
-        known = [one * of_weight_one for one in variances(self.angles, passed)]
-        measured = variances([np.asarray(self.torques[one]) for one in equations], passed)
-        torques = [one * of_weight_one for one in measured]
         return [known[one] if one < len(known) else 0.0 for one in channels], torques
 
     def on_grid(self, sampling: Sampling) -> Masses:
@@ -290,7 +297,8 @@ def identify_masses(trials: Sequence[Masses], asked: AskedTogether, term_values:
         inside = [_rewired(one, {channel: place for place, channel in enumerate(channels)}) for one in inside]
         given = [_recorded(one, equations, channels, names, term_values) for one in several]
         noise = joined.noise(channels, equations, asked.sampling.passed)
-        parts.append(asked.part(Equations(inside, equations, given), samples, noise, len(parts)))
+        is_white = joined.variances is None or bool(joined.momenta)
+        parts.append(asked.part(Equations(inside, equations, given), samples, noise, len(parts), is_white=is_white))
     if asked.earlier is not None:
         asked.earlier.check_parts(len(parts))
     merging = Merging(

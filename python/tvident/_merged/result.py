@@ -183,7 +183,7 @@ class MergedIdentification(Oscillating, Reported):
         part = replace(
             merging,
             parts=(),
-            sampling=replace(merging.sampling, start=float(time[0]), clock=None, passed=None),
+            sampling=replace(merging.sampling.of_result, start=float(time[0])),
             samples=count,
             phase=None if self.phase is None else self.phase[samples],
             inertia={name: self._wanted(pattern)[:, :, samples] for name, pattern in merging.inertia.items()},
@@ -210,7 +210,7 @@ class MergedIdentification(Oscillating, Reported):
 
     def __getstate__(self) -> dict[str, Any]:
         # A record may be long, and functions cannot be stored; what was found of it stays.
-        sampling = replace(self._merging.sampling, clock=None, passed=None)
+        sampling = self._merging.sampling.of_result
         known = {"_covariances": self._covariances, "_told": self._told}
         return {
             **self.__dict__,

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
-from tvident._clocks import Clock, Grid, Passed, clock_of
+from tvident._clocks import Clock, Grid, Passed, Timed, clock_of
 
 Numbers = npt.NDArray[np.number]
 
@@ -30,6 +30,8 @@ class Sampling:
     passed : Passed, optional
         What that makes of white noise.
     workers : int, optional
+    bridges : Timed, optional
+        How short gaps were bridged; None where none were.
     """
 
     period: float
@@ -37,6 +39,7 @@ class Sampling:
     clock: Clock | None = None
     passed: Passed | None = None
     workers: int | None = None
+    bridges: Timed | None = None
 
     @classmethod
     def of_grid(
@@ -56,12 +59,19 @@ class Sampling:
     @property
     def words(self) -> str:
         """What was done; empty where nothing was."""
-        return "" if self.clock is None else self.clock.words
+        done = self.clock if self.bridges is None else self.bridges
+        return "" if done is None else done.words
 
     @property
     def settings(self) -> dict[str, Any]:
         """What settings keep."""
-        return {} if self.clock is None else self.clock.settings
+        done = self.clock if self.bridges is None else self.bridges
+        return {} if done is None else done.settings
+
+    @property
+    def of_result(self) -> Sampling:
+        """The times of what was found, without how they came about."""
+        return replace(self, clock=None, passed=None, bridges=None)
 
     def times(self, samples: int) -> npt.NDArray[np.float64]:
         """Return the times of samples in seconds."""

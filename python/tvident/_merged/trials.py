@@ -39,6 +39,8 @@ class Trials:
         Of every sample of the result.
     weights : sequence of ndarray, or None
         Of every sample of a trial.
+    noise : (list of float, list of float), or None
+        Variances of the noise of angle and torque, where bridging gaps changed it.
     """
 
     angles: Sequence[Numbers]
@@ -48,6 +50,7 @@ class Trials:
     samples: int
     phase: npt.NDArray[np.float64] | None
     weights: Sequence[npt.NDArray[np.float64] | None] | None = None
+    noise: tuple[list[float], list[float]] | None = None
 
     def scaled(self, angle: float, torque: float) -> Trials:
         """Return the trials with their channels times factors of units."""
