@@ -60,6 +60,24 @@ def test_a_torque_of_another_rate(rate: float) -> None:
     within_errors(begun, 1)
 
 
+def test_records_of_a_list_have_clocks_of_their_own() -> None:
+    records = [
+        (sampled(seed, "angle", clock(800.0), 1e-3), sampled(seed, "torque", clock(300.0), 1e-2)) for seed in (1, 2, 3)
+    ]
+    angles, torques = [one[: -8 * place or None] for place, (one, _) in enumerate(records)], [one for _, one in records]
+    each = [tvident.identify(*one, sample_rate=(800.0, 300.0), **CONSTANT) for one in zip(angles, torques, strict=True)]
+    times = [(clock(800.0)[: one.size] - 0.5, clock(300.0) - 0.5) for one in angles]
+    identify: Any = tvident.identify
+    for said in ({"sample_rate": (800.0, 300.0)}, {"sample_rate": [(800.0, 300.0)] * 3}, {"t": times}):
+        for found, alone in zip(identify(angles, torques, **said, **CONSTANT), each, strict=True):
+            assert found.constants["stiffness"] == pytest.approx(alone.constants["stiffness"], rel=1e-9)
+    # Two records of one length have two rates between them, unless those of angle and torque differ.
+    pair = identify([records[0][0]] * 2, [records[0][1]] * 2, sample_rate=(800.0, 300.0), share="inertia", **CONSTANT)
+    within_errors(pair[0], 1)
+    shared = identify(angles, torques, sample_rate=(800.0, 300.0), share=("inertia",))
+    assert shared.constants["inertia"][1] < min(one.constants["inertia"][1] for one in each)
+
+
 def test_an_offset_is_found_from_the_equation() -> None:
     ours, theirs = clock(1000.0), clock(1000.0, 0.6)
     angle, torque = sampled(2, "angle", ours, 1e-3), sampled(2, "torque", theirs, 0.05)

@@ -125,14 +125,14 @@ def identify(
         Torque in N m.
     sample_rate : float or (float, float)
         Samples per second. Give exactly one of `sample_rate`, `delta` and `t`, or an angle with an index of dates. Two numbers are
-        the rates of angle and torque, which begin at the same time and may have different lengths.
+        the rates of angle and torque, which begin at the same time and may have different lengths; a list has one such pair a record.
     delta : float
         Sample period in seconds.
     t : array_like, shape (n,)
         Time of every sample: seconds, dates or durations, which increase. Dates, in any time zone, become seconds from the first sample on.
         Where times are uniform to a thousandth of the sample period, or within the digits that they were printed with, only the sample
         rate counts. Otherwise channels are brought onto a uniform grid by splines: see Notes. A tuple of two arrays has the times of the
-        angle and those of the torque, which may differ in number, rate and beginning.
+        angle and those of the torque, which may differ in number, rate and beginning; a list of records takes a list of such tuples.
     angle_unit, torque_unit, time_unit : str, optional
         Units of `angle`, `torque`, and of `t` and `delta`: ``"deg"``, ``"N mm"``, ``"ms"`` and others. By default what an array says of
         itself (a :class:`Channel`, a quantity of pint; of times ``attrs["units"]`` of xarray, too), or else rad, N m and s. A position in

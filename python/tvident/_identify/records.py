@@ -26,6 +26,9 @@ _OTHERS = ("sample_rate", "delta", "lag", "inertia", "damping", "stiffness", "se
 _OF_RECORDS = frozenset({"settings", "sample_rate", "delta", "lag"})
 """Those of which a list has one for every record, and nothing else."""
 
+_PAIR = 2
+"""Clocks: that of the angle and that of the torque."""
+
 _MOST_CORRELATED = 0.9999
 """Constants of one record are taken for no more correlated than this, so that rounding makes no variance negative."""
 
@@ -52,9 +55,11 @@ def calls_of_records(call: Mapping[str, Any], share: Sequence[str]) -> list[dict
     if share:
         count = count or _records_of_batch(motion, call[motion])
         _check_shared(share, call)
-    elif count is None or not _differ(call):
+    elif count is None or not (_differ(call) or _have_two_clocks(call)):
         return None
     _check_each_is_one(call)
+    if _is_two_rates(call["sample_rate"]) and (count != _PAIR or _lengths_differ(call)):
+        call = {**call, "sample_rate": [call["sample_rate"]] * count}
     calls: list[dict[str, Any]] = [{} for _ in range(count)]
     for name, value in call.items():
         for place, one in enumerate(_each(name, value, count)):
@@ -67,6 +72,33 @@ def _differ(call: Mapping[str, Any]) -> bool:
     lists = [call[name] for name in _CHANNELS if _records(name, call[name]) is not None]
     has_gaps = any(one is None for each in lists for one in each)
     return has_gaps or len({np.shape(one)[-1] for one in lists[0]}) > 1
+
+
+def _have_two_clocks(call: Mapping[str, Any]) -> bool:
+    """Return whether angle and torque of records have each a clock of their own: such records are no batch."""
+    rate, times = call["sample_rate"], call["t"]
+    of_each = [*(rate if isinstance(rate, list) else ()), *(times if isinstance(times, list) else ())]
+    return any(_is_two_rates(one) or _is_two_times(one) for one in of_each) or (
+        _is_two_rates(rate) and _lengths_differ(call)
+    )
+
+
+def _is_two_rates(value: Any) -> bool:
+    """Return whether a value is the rates of angle and torque."""
+    return isinstance(value, tuple) and len(value) == _PAIR and all(np.ndim(one) == 0 for one in value)
+
+
+def _is_two_times(value: Any) -> bool:
+    """Return whether a value is the times of angle and those of torque."""
+    return isinstance(value, tuple) and len(value) == _PAIR and all(np.ndim(one) > 0 for one in value)
+
+
+def _lengths_differ(call: Mapping[str, Any]) -> bool:
+    """Return whether the torque of a record has another length than its angle, as with another rate."""
+    angles, torques = call["angle"], call["torque"]
+    return angles is not None and any(
+        np.shape(one) != np.shape(other) for one, other in zip(angles, torques, strict=False)
+    )
 
 
 def identify_records(
@@ -143,8 +175,10 @@ def _records(name: str, values: Any) -> int | None:
     """Return how many records a list holds, of which any may be None; None where it is none, or one record of numbers."""
     if not isinstance(values, list | tuple) or not values:
         return None
-    if any(one is not None and not _shape(f"{name}[{place}]", one) for place, one in enumerate(values)):
-        return None
+    two_clocks = name == "t" and isinstance(values, list)
+    for place, one in enumerate(values):
+        if one is not None and not (two_clocks and _is_two_times(one)) and not _shape(f"{name}[{place}]", one):
+            return None
     return len(values)
 
 
@@ -162,7 +196,7 @@ def _check_each_is_one(call: Mapping[str, Any]) -> None:
     """Check that what a list holds of a channel is one record each."""
     for name in _CHANNELS:
         for place, one in enumerate(call[name] if _records(name, call[name]) else ()):
-            if one is None:
+            if one is None or (name == "t" and _is_two_times(one)):
                 continue
             shape = _shape(f"{name}[{place}]", one)
             if len(shape) > 1 and shape[1:] != (1,):
