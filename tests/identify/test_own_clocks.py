@@ -60,6 +60,31 @@ def test_a_torque_of_another_rate(rate: float) -> None:
     within_errors(begun, 1)
 
 
+def error_and_coverage(result: tvident.Identification, seed: int) -> tuple[float, float]:
+    """Return the relative error of the stiffness where it is trusted, and the part of it within two standard errors."""
+    off = (result.stiffness - rig(seed).stiffness[0])[result.trusted]
+    errors = result.stderr["stiffness"][result.trusted]
+    return float(np.sqrt(np.mean(off**2)) / rig(seed).stiffness[0]), float(np.mean(np.abs(off) < 2 * errors))
+
+
+@pytest.mark.parametrize("rate", [500.0, 3000.0])
+@pytest.mark.parametrize("method", ["paper", tvident.StrongForm(window_length=101, regression_window=150)])
+def test_in_strong_form_derivatives_are_those_of_the_angles_own_samples(rate: float, method: Any) -> None:
+    options: dict[str, Any] = {"method": method, **dict.fromkeys(CONSTANT, "windowed")}
+    angle = sampled(2, "angle", clock(600.0), 1e-3)
+    torque, at_one_rate = (sampled(2, "torque", clock(one), 1e-2) for one in (rate, 600.0))
+    result = tvident.identify(angle, torque, sample_rate=(600.0, rate), **options)
+    assert result.settings["sample_rate"] == pytest.approx(600.0)
+    error, coverage = error_and_coverage(result, 2)
+    usual_error, usual_coverage = error_and_coverage(
+        tvident.identify(angle, at_one_rate, sample_rate=600.0, **options), 2
+    )
+    assert error < 1.3 * usual_error
+    assert coverage > usual_coverage - 0.05
+    again = tvident.identify(angle, torque, sample_rate=(600.0, rate), settings=result.settings)
+    np.testing.assert_array_equal(again.stiffness, result.stiffness)
+
+
 def test_records_of_a_list_have_clocks_of_their_own() -> None:
     records = [
         (sampled(seed, "angle", clock(800.0), 1e-3), sampled(seed, "torque", clock(300.0), 1e-2)) for seed in (1, 2, 3)

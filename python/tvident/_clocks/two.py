@@ -1,4 +1,4 @@
-"""Angle and torque on clocks of their own: both brought onto one grid, at the rate of the faster."""
+"""Angle and torque on clocks of their own: both brought onto one grid, at the rate of the faster, or of the angle."""
 
 from __future__ import annotations
 
@@ -94,7 +94,12 @@ class TwoClocks:
 
 
 def two_clocks(
-    angle: Any, torque: Any, channels: Sequence[npt.NDArray[np.number]], time_unit: str | None = None
+    angle: Any,
+    torque: Any,
+    channels: Sequence[npt.NDArray[np.number]],
+    time_unit: str | None = None,
+    *,
+    by_angle: bool = False,
 ) -> TwoClocks:
     """Return the clocks of two channels from times, or from sample rates of channels that begin together.
 
@@ -105,6 +110,8 @@ def two_clocks(
     channels : sequence of ndarray, shape (n,)
         Samples of angle and torque, which tell whether some were lost.
     time_unit : str, optional
+    by_angle : bool, optional
+        The grid is the angle's clock, which derivatives are taken of: on the grid of a faster torque its noise would seem to be motion.
 
     Raises
     ------
@@ -114,14 +121,14 @@ def two_clocks(
     own = [_grid(one, samples, time_unit) for one, samples in zip((angle, torque), channels, strict=True)]
     start = max(one.start for one in own)
     end = min(one.start + one.period * float(one.places[-1]) for one in own)
-    period = min(one.period for one in own)
+    # On the samples of one of the clocks, so that these stay as they are.
+    leading = own[0] if by_angle else min(own, key=lambda one: one.period)
+    period = leading.period
     if not end - start > period:
         raise ValueError(
             f"the times of angle and torque must overlap; they share {max(0.0, end - start):g} s; check the clocks' units and starts"
         )
-    # On the faster clock's own samples, so that these stay as they are.
-    faster = min(own, key=lambda one: one.period)
-    start = faster.start + math.ceil((start - faster.start) / period - _SAME) * period
+    start = leading.start + math.ceil((start - leading.start) / period - _SAME) * period
     return TwoClocks(own[0], own[1], start, period, math.floor((end - start) / period + _SAME) + 1)
 
 

@@ -149,6 +149,7 @@ def own_clocks(
     *,
     time_unit: str | None,
     propagate: bool,
+    by_angle: bool = False,
 ) -> OwnClocks | None:
     """Return the clocks of angle and torque where a call gives each its own, or asks for their alignment; None elsewhere.
 
@@ -161,6 +162,8 @@ def own_clocks(
     align : {"offset", "drift"}, float or None
     time_unit : str, optional
     propagate : bool
+    by_angle : bool, optional
+        Derivatives are taken of the angle, so that both are brought onto its clock.
     """
     given = {name: value for name, value in time.items() if value is not None}
     pairs = {name: value for name, value in given.items() if _is_pair(name, value)}
@@ -191,7 +194,7 @@ def own_clocks(
         torque, of_torque = _without_empty_rows(torque, of_torque)
     if name == "delta":
         of_angle, of_torque = (1 / arguments.positive_number("delta", each) for each in (of_angle, of_torque))
-    clocks = two_clocks(of_angle, of_torque, (angle, torque), time_unit)
+    clocks = two_clocks(of_angle, of_torque, (angle, torque), time_unit, by_angle=by_angle)
     return OwnClocks(clocks, (angle, torque), align, propagate)
 
 

@@ -20,7 +20,7 @@ from tvident._identify.methods import StrongForm, WeakForm
 from tvident._identify.own_clocks import check_every_sample, lag_found, own_clocks
 from tvident._identify.read_torque import with_read_torque
 from tvident._identify.robust import loss_of, with_clipped_torque
-from tvident._identify.settings import Request, resolve
+from tvident._identify.settings import Request, is_strong, resolve
 from tvident._identify.signals import Signals, channels_of_motion, even_times, instrument_of, with_own_step
 from tvident._identify.task import Task
 from tvident._identify.together import sampled
@@ -71,6 +71,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         call["align"],
         time_unit=call["time_unit"],
         propagate=call["nan_policy"] == "propagate",
+        by_angle=is_strong(call["method"], call["settings"]),
     )
     torque = call["torque"]
     if clocks is not None:

@@ -319,6 +319,13 @@ def _with_instrument(asked: dict[str, Any], given: Mapping[str, Any]) -> dict[st
     return asked
 
 
+def is_strong(method: Method, earlier: Mapping[str, Any] | None) -> bool:
+    """Return whether the strong form is asked for, by a method or by the settings of an earlier result."""
+    if arguments.is_word(method, "auto") and isinstance(earlier, Mapping):
+        return earlier.get("form") == "strong"
+    return isinstance(_method(method)[1], StrongForm)
+
+
 def _method(method: Method) -> tuple[str, Form]:
     """Return the name of a method and its form."""
     if isinstance(method, WeakForm):
