@@ -85,6 +85,21 @@ def test_in_strong_form_derivatives_are_those_of_the_angles_own_samples(rate: fl
     np.testing.assert_array_equal(again.stiffness, result.stiffness)
 
 
+@pytest.mark.parametrize("rate", [250.0, 2000.0])
+@pytest.mark.parametrize("part", [0.003, 0.03, 0.1])
+def test_samples_that_a_channel_misses_cost_little(rate: float, part: float) -> None:
+    angle, torque = sampled(3, "angle", clock(1000.0), 1e-3), sampled(3, "torque", clock(rate), 1e-2)
+    whole = tvident.identify(angle, torque, sample_rate=(1000.0, rate), **CONSTANT)
+    rng = np.random.default_rng(3)
+    angle, torque = (np.where(rng.random(one.size) < part, np.nan, one) for one in (angle, torque))
+    result = tvident.identify(angle, torque, sample_rate=(1000.0, rate), **CONSTANT)
+    within_errors(result, 3)
+    for name in CONSTANT:
+        assert result.constants[name][1] < (1.1 + 6 * part) * whole.constants[name][1]
+    missing = tvident.identify(angle, torque, sample_rate=(1000.0, rate), nan_policy="propagate", **CONSTANT)
+    assert missing.constants["inertia"][1] > result.constants["inertia"][1] or part < 0.01
+
+
 def test_records_of_a_list_have_clocks_of_their_own() -> None:
     records = [
         (sampled(seed, "angle", clock(800.0), 1e-3), sampled(seed, "torque", clock(300.0), 1e-2)) for seed in (1, 2, 3)

@@ -199,6 +199,16 @@ def bridged(
     return Bridged(found, passed, settings, words)
 
 
+def longest_bridged_in(values: npt.NDArray[np.number], order: int) -> float:
+    """Return the longest step in periods that splines go over in a channel on a uniform clock; 0 where gaps are better left out.
+
+    However rare they are: on the grid of a faster channel a gap is long, and so are test functions.
+    """
+    row = _records(values)[0]
+    bridge = bridge_of({"": row}, order) if _saved(row) > 0 else None
+    return bridge.longest if bridge is not None and bridge.longest >= _MOST_LOST else 0.0
+
+
 def _records(values: npt.NDArray[np.number]) -> _Rows:
     """Return the records of a channel, NaN where nothing is known."""
     rows = np.array(values.reshape(-1, values.shape[-1]), dtype=np.float64)

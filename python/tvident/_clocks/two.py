@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident import _core
 from tvident._clocks.grid import Grid, Numbers, grid_of
+from tvident._clocks.missing import longest_bridged_in
 from tvident._clocks.passed import Passed
 from tvident._units import times_in_seconds
 
@@ -87,8 +89,19 @@ class TwoClocks:
         whole = np.rint(places)
         if float(np.abs(places - whole).max()) <= _SAME:
             places = whole
-        bridged = own.bridged * own.period / self.period
-        resampling = _core.Resampling(places, self.samples, order=_ORDER, bridged=bridged, propagate=propagate)
+        there = np.isfinite(values)
+        longest = max(own.bridged, 0.0 if propagate else longest_bridged_in(values, _ORDER))
+        resampled = partial(
+            _core.Resampling,
+            grid=self.samples,
+            order=_ORDER,
+            bridged=longest * own.period / self.period,
+            propagate=propagate,
+        )
+        resampling = resampled(places)
+        if longest > own.bridged:
+            # White noise is taken where samples are.
+            return resampling.onto_grid(values), Passed(resampled(places[there]))
         passed = None if places is whole and own.period / self.period < _GAP else Passed(resampling)
         return resampling.onto_grid(values), passed
 
