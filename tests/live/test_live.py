@@ -84,6 +84,22 @@ def test_units_of_a_header_are_converted(
     assert "could not be read" not in words
 
 
+def test_units_of_keys_are_converted() -> None:
+    names = ("t [ms]", "motor.angle [deg]", "torque[Nmm]")
+    factors = (1e3, 180 / np.pi, 1e3)
+    columns = [each * factor for each, factor in zip((RIG.time, RIG.angle, RIG.torque), factors, strict=True)]
+    rows = [dict(zip(names, row, strict=True)) for row in np.array(columns).T[:900].tolist()]
+    options = ("--angle", names[1], "--torque", names[2], "--time", names[0], "--sample-rate", "1000")
+    found, words = run("".join(json.dumps(row) + "\n" for row in rows), *options)
+    expected = tvident.identify(RIG.angle[:900], RIG.torque[:900], sample_rate=1000, method="paper").stiffness
+    np.testing.assert_allclose(np.array([row["stiffness"] for row in found], dtype=float), expected, rtol=1e-7)
+    assert "lost samples: 0" in words
+    # What is in brackets may be a name, too.
+    listed = "".join(json.dumps({"joint [left]": row[names[1]], "T": row[names[2]]}) + "\n" for row in rows)
+    found, _ = run(listed, "--angle", "joint [left]", "--torque", "T", "--sample-rate", "1000")
+    assert len(found) == 900
+
+
 @pytest.mark.slow
 def test_settings_of_a_result_in_weak_form_give_its_stream(tmp_path: Path) -> None:
     earlier = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000)

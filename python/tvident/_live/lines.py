@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from tvident._units import is_unit, named_unit
+from tvident._units import is_unit, named_unit, unit_of
 
 _BLOCK = 1 << 16
 _DAMAGED = 1e-3
@@ -47,7 +47,7 @@ class Lines:
         """Lines that came before anybody asked for pieces."""
         self._is_begun = self._has_ended = False
         self.units = [""] * len(self._names)
-        """Of the channels, as a header or a line below it says them."""
+        """Of the channels, as a header, a line below it or keys say them."""
         self.read = self.unreadable = 0
         self.first_unreadable = ""
         """The line, and the key that it has not."""
@@ -103,6 +103,8 @@ class Lines:
         line = self._early[first]
         if line[0] in "{[":
             self._cells, self._is_begun = _json(self._names), True
+            named = [named_unit(name)[1] for name in self._names]
+            self.units = [unit if unit_of(unit) is not None else "" for unit in named]
             return True
         separator = _separator(line)
         header = _split(line, separator)
