@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from functools import cache
 from typing import Any
 
@@ -76,3 +77,14 @@ def test_a_constant_damping_along_a_sweep_says_nothing_of_it() -> None:
     result = tvident.identify(rig.angle, rig.torque, sample_rate=RATE)
     assert not any("need not change" in line or "late" in line for line in result.advice)
     assert not result.record_status & Status.LAG_SUSPECTED
+
+
+def test_a_stiffness_without_any_number_is_no_reason_to_warn() -> None:
+    rig = tvident.simulate_torsional_rig(duration=4.0, sample_rate=5000, seed=51003, pattern="constant")
+    lost = np.random.default_rng(3).random(rig.angle.size) < 0.1
+    angle = np.where(lost, np.nan, rig.angle)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        result = tvident.identify(angle, rig.torque, sample_rate=5000, nan_policy="propagate")
+        assert not result.trusted.any()
+        assert "do not trust" in result.summary().splitlines()[0]

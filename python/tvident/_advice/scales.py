@@ -111,7 +111,9 @@ def _but_for(scan: _core.Scan) -> str:
 def _none_of_stiffness(found: _core.Identification, names: Sequence[str]) -> str:
     """Return what to try first where the stiffness is not told from zero."""
     for name, one in zip(names, found.unknowns, strict=True):
-        if name == "stiffness" and bool(np.nanmedian(np.abs(one.values) / one.stderr) < _TOLD):
+        told = np.abs(one.values) / one.stderr
+        told = told[np.isfinite(told)]
+        if name == "stiffness" and told.size and bool(np.median(told) < _TOLD):
             return "the stiffness is not told from zero: try stiffness=0; "
     return ""
 
