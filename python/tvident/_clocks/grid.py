@@ -84,6 +84,13 @@ class Grid:
         return found
 
 
+def in_no_gap(places: Numbers, wanted: Numbers, longest: float) -> npt.NDArray[np.bool_]:
+    """Return which wanted places lie between samples that are no farther apart than the longest step that is no gap."""
+    left = np.clip(np.searchsorted(places, wanted, side="right") - 1, 0, places.size - 1)
+    right = np.clip(np.searchsorted(places, wanted, side="left"), 0, places.size - 1)
+    return np.asarray(places[right] - places[left] <= longest)
+
+
 def grid_of(times: Numbers) -> Grid:
     """Return the grid of times that increase.
 

@@ -280,8 +280,8 @@ def identify(
     ``nan_policy="omit"``, in every channel its own, where short gaps would take more than a tenth of the equations. Where a channel is
     smooth in sample number and not in time, the stamps jitter and not the samples, as behind a buffer: then samples are taken to be even,
     and the advice says so, with CHANNEL_SUSPECTED. Where angle and torque have clocks of their own, both are brought onto a grid at the
-    rate of the faster, so that every sample of both counts, and single missing samples are bridged; in strong form onto the clock of the
-    angle, which derivatives are taken of. Results are at the times of the grid, ``time``. All this costs about 1 µs a sample.
+    rate of the faster, so that every sample of both counts, and single missing samples are bridged; in strong form, and with an
+    :class:`Expansion`, onto the clock of the angle. Results are at the times of the grid, ``time``. All this costs about 1 µs a sample.
 
     See Also
     --------

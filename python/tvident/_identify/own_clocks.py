@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._clocks import Passed, TwoClocks, two_clocks
+from tvident._clocks import Passed, TwoClocks, in_no_gap, two_clocks
 from tvident._identify.aligned import Align, Aligned, Late, aligned
 from tvident._identify.data import Data
 from tvident._units import scaled
@@ -71,6 +71,16 @@ class OwnClocks:
     def channels(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
         """Return angle and torque on the grid, by their stamps."""
         return self._angle()[0], self._torque((0.0, 0.0))[0]
+
+    def known(self, values: Any, *, over_gaps: bool = True) -> Any:
+        """Return what is known at every sample of the angle, or of the torque, on the grid along straight lines; else as it is."""
+        clocks = zip((self.clocks.angle, self.clocks.torque), self.recorded, strict=True)
+        own = next((clock for clock, recorded in clocks if np.shape(values)[-1:] == recorded.shape), None)
+        if own is None:
+            return values
+        wanted = (self.clocks.time - own.start) / own.period
+        found = np.interp(wanted, own.places, np.asarray(values, dtype=np.float64))
+        return found if over_gaps else np.where(in_no_gap(own.places, wanted, own.longest), found, np.nan)
 
     def finished(
         self,

@@ -12,16 +12,24 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._clocks import Grid, grid_of
-from tvident._equation import LINEAR_UNITS, UNITS
+from tvident._equation import COEFFICIENTS, LINEAR_UNITS, UNITS, has_kind
+from tvident._expansion import Expansion
 from tvident._identify.channels import motion_channels
 from tvident._identify.data import Data
 from tvident._identify.expanded import ExpandedTask, expansions_of
 from tvident._identify.methods import StrongForm, WeakForm
-from tvident._identify.own_clocks import check_every_sample, lag_found, own_clocks
+from tvident._identify.own_clocks import OwnClocks, check_every_sample, lag_found, own_clocks
 from tvident._identify.read_torque import with_read_torque
 from tvident._identify.robust import loss_of, with_clipped_torque
 from tvident._identify.settings import Request, is_strong, resolve
-from tvident._identify.signals import Signals, channels_of_motion, even_times, instrument_of, with_own_step
+from tvident._identify.signals import (
+    Signals,
+    channels_of_motion,
+    even_times,
+    instrument_of,
+    with_known,
+    with_own_step,
+)
 from tvident._identify.task import Task
 from tvident._identify.together import sampled
 from tvident._identify.weighted import Weights, usable_channels, weights_of
@@ -71,7 +79,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         call["align"],
         time_unit=call["time_unit"],
         propagate=call["nan_policy"] == "propagate",
-        by_angle=is_strong(call["method"], call["settings"]),
+        by_angle=is_strong(call["method"], call["settings"]) or _has_expansions(call),
     )
     torque = call["torque"]
     if clocks is not None:
@@ -119,6 +127,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         signals, request = signals.on_grid(
             grid, request, call["settings"], propagate=propagate, workers=call["workers"]
         )
+    request = _on_clocks(request, clocks)
     is_bridged = grid is None and clocks is None and not propagate and isinstance(request.form, WeakForm)
     if is_bridged:
         signals, request = signals.over_holds(request, call["settings"], workers=call["workers"])
@@ -156,6 +165,18 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         data = with_read_torque(data, lambda some: task(some, request).run(None))
     data = with_clipped_torque(data, asked, lambda some: task(some, request).run(None))
     return task(data, request)
+
+
+def _on_clocks(request: Request, clocks: OwnClocks | None) -> Request:
+    """Return a request with what is known at every sample on the grid of two clocks, where there are two."""
+    return request if clocks is None else with_known(request, clocks.known, partial(clocks.known, over_gaps=False))
+
+
+def _has_expansions(call: Mapping[str, Any]) -> bool:
+    """Return whether a call asks for expansions, whose rows are weighted by the noise of their samples."""
+    terms = call["terms"] if isinstance(call["terms"], tuple | list) else ()
+    kinds = [*(call[name] for name in COEFFICIENTS), *(term[1] for term in terms if has_kind(term))]
+    return any(isinstance(kind, Expansion) for kind in kinds)
 
 
 def _equation(call: Mapping[str, Any], axis: Axis) -> dict[str, Any]:

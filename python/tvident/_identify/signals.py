@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -10,8 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._clocks import Bridged, Grid, Passed, Timed, bridged, clock_of, unheld
+from tvident._clocks import Bridged, Grid, Passed, Timed, bridged, clock_of, in_no_gap, unheld
 from tvident._derivatives import quantisation_step
+from tvident._equation import has_kind
+from tvident._expansion import Expansion
 from tvident._identify.settings import Request
 
 _Channels = Mapping[str, npt.NDArray[np.number]]
@@ -76,8 +78,13 @@ class Signals:
             {} if evened.passed is None else dict.fromkeys(recorded, evened.passed),
             [(record, clock.doubt) for record in range(records) if clock.doubt],
         )
-        known = {name: evened.known(value) for name, value in request.parameters.items()}
-        return signals, replace(request, parameters=known)
+
+        def channel(values: Any) -> Any:
+            found = evened.known(values)
+            wanted = np.arange(evened.time.size, dtype=np.float64)
+            return found if found is values else np.where(in_no_gap(evened.places, wanted, grid.longest), found, np.nan)
+
+        return signals, with_known(request, evened.known, channel)
 
     def over_holds(
         self, request: Request, earlier: Mapping[str, Any] | None, *, workers: int | None
@@ -116,6 +123,22 @@ class Signals:
         """Everything that was recorded, by name."""
         own = {} if self.instruments is None else {"instrument": self.instruments}
         return {**self.channels, "torque": self.torques, **own}
+
+
+def with_known(request: Request, change: Callable[[Any], Any], of_channel: Callable[[Any], Any]) -> Request:
+    """Return a request whose parameters that are known at every sample are changed, and in their own way channels of expansions."""
+
+    def changed(one: Any) -> Any:
+        if not isinstance(one, Expansion):
+            return change(one)
+        channels = tuple(map(of_channel, one.channels))
+        return replace(one, of=channels if len(channels) > 1 else channels[0]) if channels else one
+
+    parameters = {name: changed(one) for name, one in request.parameters.items()}
+    terms: Any = request.terms
+    if isinstance(terms, tuple | list):
+        terms = type(terms)((term[0], changed(term[1])) if has_kind(term) else term for term in terms)
+    return replace(request, parameters=parameters, terms=terms)
 
 
 def with_own_step(request: Request, channels: _Channels) -> Request:

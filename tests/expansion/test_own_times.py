@@ -1,0 +1,91 @@
+"""Schedules of records whose times are not uniform, or whose angle and torque have clocks of their own."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.interpolate import make_interp_spline
+
+import tvident
+
+Array = npt.NDArray[np.float64]
+
+DURATION = 12.0
+
+
+@cache
+def true(seed: int) -> tuple[Any, Any, Any]:
+    """Give the angle, the torque and the slider's position of a rig at any time; its stiffness is 6 over the position."""
+    rig = tvident.simulate_torsional_rig(
+        duration=DURATION + 1, sample_rate=2000, seed=seed, torque_snr_db=200, angle_noise=0
+    )
+    angle, torque, position = (
+        make_interp_spline(rig.time, one, k=5) for one in (rig.true_angle, rig.true_torque, rig.slider_position)
+    )
+    return angle, torque, position
+
+
+def noisy(values: Array, part: float, seed: int) -> Array:
+    return np.asarray(values + part * values.std() * np.random.default_rng(seed).standard_normal(values.size))
+
+
+def errors(result: tvident.Identification, seed: int) -> tuple[float, float]:
+    """Give the relative error of the stiffness, and the largest in standard errors."""
+    told, stiffness = result.trusted, 6 / true(seed)[2](result.time)
+    off = (result.stiffness - stiffness)[told]
+    return (
+        float(np.sqrt(np.mean((off / stiffness[told]) ** 2))),
+        float(np.max(np.abs(off) / result.stderr["stiffness"][told])),
+    )
+
+
+@pytest.mark.parametrize("jitter", [0.2, 0.5, 1.0])
+def test_a_schedule_at_times_that_wander_is_that_of_their_samples(jitter: float) -> None:
+    steps = 1 + jitter * np.random.default_rng(1).uniform(-0.5, 0.5, int(500 * DURATION))
+    t = np.cumsum(steps) / 500
+    angle, torque, position = (one(t) for one in true(1))
+    schedule = tvident.Expansion("bspline", of=position)
+    result = tvident.identify(noisy(angle, 1e-3, 2), noisy(torque, 1e-2, 3), t=t, stiffness=schedule)
+    error, beyond = errors(result, 1)
+    assert error < 2e-3
+    assert beyond < 4
+
+
+def test_a_schedule_goes_over_times_that_are_missing() -> None:
+    t = np.arange(int(500 * DURATION)) / 500
+    t = np.delete(t, slice(2000, 2200))
+    angle, torque, position = (one(t) for one in true(1))
+    schedule = tvident.Expansion("bspline", of=position)
+    result = tvident.identify(noisy(angle, 1e-3, 2), noisy(torque, 1e-2, 3), t=t, stiffness=schedule)
+    error, beyond = errors(result, 1)
+    assert error < 2e-3
+    assert beyond < 4
+    assert result.trusted.mean() > 0.9
+
+
+@pytest.mark.parametrize("of", ["angle", "torque"])
+@pytest.mark.parametrize("rate", [100.0, 300.0, 1000.0, 4000.0])
+def test_a_schedule_has_the_clock_of_the_angle_or_of_the_torque(rate: float, of: str) -> None:
+    ours, theirs = (np.arange(int(one * DURATION)) / one for one in (400.0, rate))
+    angle, torque = true(4)[0](ours), true(4)[1](theirs)
+    schedule = tvident.Expansion("bspline", of=true(4)[2](ours if of == "angle" else theirs))
+    result = tvident.identify(
+        noisy(angle, 1e-3, 5), noisy(torque, 1e-2, 6), sample_rate=(400.0, rate), stiffness=schedule
+    )
+    error, beyond = errors(result, 4)
+    assert error < 2e-3
+    assert beyond < 4
+    assert not tvident.Status.NOISE_MODEL & int(result.record_status)
+    assert result.settings["sample_rate"] == pytest.approx(400.0)
+
+
+def test_a_stiffness_that_is_known_may_have_the_clock_of_the_angle() -> None:
+    ours, theirs = (np.arange(int(one * DURATION)) / one for one in (400.0, 1000.0))
+    angle, torque = noisy(true(4)[0](ours), 1e-3, 5), noisy(true(4)[1](theirs), 1e-2, 6)
+    result = tvident.identify(angle, torque, sample_rate=(400.0, 1000.0), stiffness=6 / true(4)[2](ours))
+    value, error = result.constants["inertia"]
+    assert abs(value - 0.0123) < 4 * error < 0.0004
