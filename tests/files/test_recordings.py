@@ -109,3 +109,12 @@ def test_a_missing_reader_says_which_extra_to_install(tmp_path: Path, monkeypatc
     monkeypatch.setitem(sys.modules, "pymatreader", None)
     with pytest.raises(recordings.FileError, match=r"pip install 'tvident\[io\]'"):
         recordings.read(tmp_path / "m.mat")
+
+
+def test_channels_in_groups_are_named_with_dots_or_slashes() -> None:
+    channels = {"rig.angle": np.arange(3.0), "rig.torque": np.ones(3), "rig.angle/old": np.zeros(3)}
+    assert recordings.channel(channels, "rig/angle", "x.h5") is channels["rig.angle"]
+    assert recordings.channel(channels, "/rig/torque", "x.h5") is channels["rig.torque"]
+    assert recordings.channel(channels, "rig.angle/old", "x.h5") is channels["rig.angle/old"]
+    with pytest.raises(KeyError, match="has no channel 'rig/speed'"):
+        recordings.channel(channels, "rig/speed", "x.h5")

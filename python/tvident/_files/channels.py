@@ -158,6 +158,10 @@ def full_name(channels: Mapping[str, Any], name: str, source: str) -> str:
         if len(folded) == 1:
             return folded[0]
         same = folded
+    # Who knows the file writes its groups with slashes.
+    dotted = name.strip("/").replace("/", ".")
+    if not same and dotted in channels:
+        return dotted
     place, asked = printable(source), printable(name)
     same = same or inside
     if same:
