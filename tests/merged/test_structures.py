@@ -244,3 +244,12 @@ def test_a_base_of_pint_is_converted_without_a_warning() -> None:
             found.append(result.constants["stiffness_base_0"])
     assert found[1] == pytest.approx(found[0], rel=1e-9)
     assert found[2] == pytest.approx(found[0], rel=1e-9)
+
+
+def test_none_says_nothing_of_one_of_several() -> None:
+    record = chain([lambda t: 12 + 0 * t, lambda t: 18 + 0 * t], 3000, seed=53100)
+    both = tvident.Chain(masses=2, springs=[("base", 0), (0, 1)], dampers=[("base", 0), (0, 1)])
+    options: dict[str, Any] = {"sample_rate": 1000, "dof_axis": 0, "structure": both}
+    some = tvident.identify(record.angle, record.torque, **options, inertia=[0.02, None])
+    same = tvident.identify(record.angle, record.torque, **options, inertia={0: 0.02})
+    assert some.constants == same.constants

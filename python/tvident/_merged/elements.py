@@ -61,7 +61,7 @@ class Element:
 
 
 def kind_or_number(name: str, value: object) -> Kind | float:
-    """Return how one element comes about.
+    """Return how one element comes about; None is as if nothing were said of it.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def kind_or_number(name: str, value: object) -> Kind | float:
             f"{name} must be 'windowed', 'constant', 'auto' or a number beside ensemble_axis= and dof_axis=; got an Expansion, which is "
             "not supported there yet; use 'windowed', or identify one trial of one mass"
         )
-    found = parameter(name, value, ())
+    found = parameter(name, "auto" if value is None else value, ())
     if found == "varying":
         raise ValueError(
             f"{name} must be 'windowed', 'constant', 'auto' or a number beside ensemble_axis= and dof_axis=; got 'varying', which is not "
