@@ -253,3 +253,11 @@ def test_none_says_nothing_of_one_of_several() -> None:
     some = tvident.identify(record.angle, record.torque, **options, inertia=[0.02, None])
     same = tvident.identify(record.angle, record.torque, **options, inertia={0: 0.02})
     assert some.constants == same.constants
+
+
+def test_what_must_be_finite_is_told_of_a_policy_that_there_is() -> None:
+    record = chain([lambda t: 12 + 0 * t], 1000, seed=53101)
+    angle = record.angle.copy()
+    angle[0, 5] = np.nan
+    with pytest.raises(ValueError, match="use nan_policy='omit'"):
+        tvident.identify(angle, record.torque, sample_rate=1000, dof_axis=0, nan_policy="raise")

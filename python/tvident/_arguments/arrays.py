@@ -102,7 +102,7 @@ def check_nan(name: str, array: npt.NDArray[Any], policy: str, policies: Any = N
         where = place[0] if len(place) == 1 else place
         raise ValueError(
             f"{name} must hold finite numbers where nan_policy='raise'; sample {where} is {array[place]}; "
-            "repair it or use nan_policy='propagate'"
+            f"repair it or use nan_policy={'omit' if 'omit' in get_args(policies) else 'propagate'!r}"
         )
 
 
