@@ -1,5 +1,6 @@
 //! Samples whose times are not uniform: splines that bring channels onto a uniform grid, what that does to noise, and polynomials in windows.
 
+pub(crate) mod lists_in_lanes;
 pub(crate) mod order_sums;
 pub(crate) mod order_table;
 pub(crate) mod own_basis;

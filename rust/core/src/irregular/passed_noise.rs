@@ -14,7 +14,7 @@ use std::ops::Range;
 use crate::error::Error;
 use crate::exec::pool::{Watch, map};
 use crate::irregular::resampling::Resampling;
-use crate::irregular::spline::Spline;
+use crate::irregular::spline::Splines;
 use crate::noise::channel::shown;
 use crate::noise::passed::{PassedNoise, Shown};
 use crate::simd::instructions::Instructions;
@@ -57,22 +57,32 @@ pub fn gain(resampling: &Resampling, workers: NonZeroUsize, watch: &mut Watch<'_
 
 /// The squares of a block's weights, and the periods that it covers.
 fn squares(resampling: &Resampling, block: &Range<usize>) -> (f64, f64) {
-    let around = resampling.around(block);
-    let times = &resampling.times[around.clone()];
-    let (mut squares, mut length, mut begin) = (0.0, 0.0, 0);
-    for end in 1..=times.len() {
-        if times.get(end).is_some_and(|time| time - times[end - 1] <= resampling.bridged) {
-            continue;
+    let (times, instructions) = (&resampling.times, Instructions::current());
+    // Samples between which a spline goes, of those around a stretch.
+    let mut parts: Vec<(Range<usize>, Range<usize>)> = Vec::new();
+    for (stretch, around) in resampling.stretches(block) {
+        let mut begin = around.start;
+        for end in around.start + 1..=around.end {
+            if end == around.end || times[end] - times[end - 1] > resampling.bridged {
+                parts.push((stretch.clone(), begin..end));
+                begin = end;
+            }
         }
-        let part = &times[begin..end];
-        for (place, weight) in Spline::new(part, resampling.order).weights().iter().enumerate() {
-            if block.contains(&(around.start + begin + place)) {
-                squares += weight * weight;
-                let (before, after) = (part[place.saturating_sub(1)], part[(place + 1).min(part.len() - 1)]);
+    }
+    parts.sort_by_key(|(_, part)| part.len());
+    let (mut squares, mut length) = (0.0, 0.0);
+    let alike = parts.chunk_by(|(_, one), (_, other)| one.len() == other.len());
+    for parts in alike.flat_map(|parts| parts.chunks(instructions.lanes())) {
+        let lists: Vec<&[f64]> = parts.iter().map(|(_, part)| &times[part.clone()]).collect();
+        let weights = Splines::new(&lists, resampling.order, instructions).weights();
+        for (((stretch, part), times), weights) in parts.iter().zip(lists).zip(weights) {
+            let own = stretch.start.clamp(part.start, part.end)..stretch.end.clamp(part.start, part.end);
+            for place in own.start - part.start..own.end - part.start {
+                squares += weights[place] * weights[place];
+                let (before, after) = (times[place.saturating_sub(1)], times[(place + 1).min(times.len() - 1)]);
                 length += (after - before) / 2.0;
             }
         }
-        begin = end;
     }
     (squares, length)
 }

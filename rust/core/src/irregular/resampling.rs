@@ -1,20 +1,25 @@
 //! Channels with common times that are not uniform, brought onto a uniform grid by splines.
 //!
-//! Times are in periods of the grid from its first sample on. The record is cut into blocks on a grid of absolute sample numbers; each is interpolated with
-//! so many samples before and after it that their ends do not matter (the influence of a sample on the spline falls by 0.54 a sample at order 7 and faster
-//! below), so memory does not grow with the record and the numbers do not depend on threads.
+//! Times are in periods of the grid from its first sample on. The record is cut into stretches on a grid of absolute sample numbers; each is interpolated
+//! with so many samples before and after it that their ends do not matter (the influence of a sample on the spline falls by 0.54 a sample at order 7 and
+//! faster below), so memory does not grow with the record and the numbers do not depend on threads. Stretches of a block are solved side by side.
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
 
 use crate::error::Error;
 use crate::exec::pool::{Piece, Watch, map};
-use crate::irregular::spline::Spline;
+use crate::irregular::spline::Splines;
 use crate::record::samples::is_usable;
+use crate::simd::instructions::Instructions;
+use crate::simd::vectors::MOST_LANES;
 
-/// Samples of a block, and those around it that its spline passes through too.
-const BLOCK: usize = 1 << 13;
+/// Samples of a stretch, and those around it that its spline passes through too.
+const STRETCH: usize = 1 << 10;
 const AROUND: usize = 128;
+
+/// Samples of a block: as many stretches as the longest vector has lanes.
+const BLOCK: usize = STRETCH * MOST_LANES;
 
 /// Periods by which a sample may be off the grid and still be the grid's own.
 const SAME: f64 = 1e-9;
@@ -38,6 +43,20 @@ pub struct Resampling {
 struct Block {
     first: usize,
     channels: Vec<Vec<f64>>,
+}
+
+/// Samples that a spline passes through, channels that have all of them, and places among the wanted times that lie between them.
+struct SplinedPart {
+    samples: Vec<usize>,
+    channels: Vec<usize>,
+    wanted: Range<usize>,
+}
+
+impl SplinedPart {
+    /// What parts that are solved side by side have in common.
+    fn kind(&self) -> (&[usize], usize) {
+        (&self.channels, self.samples.len())
+    }
 }
 
 impl Resampling {
@@ -65,7 +84,9 @@ impl Resampling {
     /// The channels at any times, which increase, NaN where nothing is known: of a short record, whose splines pass through all of it.
     #[must_use]
     pub fn at(&self, channels: &[&[f64]], wanted: &[f64]) -> Vec<Vec<f64>> {
-        self.around_block(&(0..self.times.len()), channels, wanted)
+        let mut parts = Vec::new();
+        self.add_parts(&(0..self.times.len()), channels, (wanted, 0..wanted.len()), &mut parts);
+        self.interpolate(parts, channels, wanted)
     }
 
     /// Parts of the record that are interpolated one by one.
@@ -92,20 +113,36 @@ impl Resampling {
         begin..end.unwrap_or(last.max(begin))
     }
 
-    /// Samples that the spline of a block passes through.
-    pub(crate) fn around(&self, samples: &Range<usize>) -> Range<usize> {
-        samples.start.saturating_sub(AROUND)..self.times.len().min(samples.end + AROUND)
+    /// The stretches of a block, and the samples that the spline of each passes through: as many of all of them where the record is long enough.
+    pub(crate) fn stretches(&self, block: &Range<usize>) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
+        let (end, total) = (block.end, self.times.len());
+        block.clone().step_by(STRETCH).map(move |first| {
+            let length = STRETCH + 2 * AROUND;
+            let begin = first.saturating_sub(AROUND).min(total.saturating_sub(length));
+            (first..end.min(first + STRETCH), begin..total.min(begin + length))
+        })
     }
 
     fn block(&self, samples: &Range<usize>, channels: &[&[f64]]) -> Block {
         let places = self.places(samples);
         let wanted: Vec<f64> = places.clone().map(|place| place as f64).collect();
-        Block { first: places.start, channels: self.around_block(&self.around(samples), channels, &wanted) }
+        let mut parts = Vec::new();
+        for (stretch, around) in self.stretches(samples) {
+            let own = self.places(&stretch);
+            let own = own.start - places.start..own.end - places.start;
+            self.add_parts(&around, channels, (&wanted, own), &mut parts);
+        }
+        Block { first: places.start, channels: self.interpolate(parts, channels, &wanted) }
     }
 
-    /// The channels at some times, by splines through some samples.
-    fn around_block(&self, around: &Range<usize>, channels: &[&[f64]], wanted: &[f64]) -> Vec<Vec<f64>> {
-        let mut found = vec![vec![f64::NAN; wanted.len()]; channels.len()];
+    /// Adds the splines through some samples, for some of the wanted times.
+    fn add_parts(
+        &self,
+        around: &Range<usize>,
+        channels: &[&[f64]],
+        (wanted, own): (&[f64], Range<usize>),
+        parts: &mut Vec<SplinedPart>,
+    ) {
         let whole = |channel: &&[f64]| channel[around.clone()].iter().all(|&value| is_usable(value));
         let (together, alone): (Vec<usize>, Vec<usize>) =
             (0..channels.len()).partition(|&place| whole(&channels[place]));
@@ -113,10 +150,16 @@ impl Resampling {
         for group in groups.chain(alone.into_iter().map(|one| vec![one])) {
             let usable: Vec<usize> = around.clone().filter(|&sample| is_usable(channels[group[0]][sample])).collect();
             for part in self.parts(&usable) {
-                self.interpolate(&usable[part], &group, channels, wanted, &mut found);
+                let samples = &usable[part];
+                let (begin, end) = (self.times[samples[0]] - SAME, self.times[samples[samples.len() - 1]] + SAME);
+                let among = &wanted[own.clone()];
+                let inside = among.partition_point(|&at| at < begin)..among.partition_point(|&at| at <= end);
+                if !inside.is_empty() {
+                    let wanted = own.start + inside.start..own.start + inside.end;
+                    parts.push(SplinedPart { samples: samples.to_vec(), channels: group.clone(), wanted });
+                }
             }
         }
-        found
     }
 
     /// Parts of the samples that are there between which nothing is known.
@@ -136,42 +179,55 @@ impl Resampling {
         parts
     }
 
-    /// Fills the times that lie between some samples.
-    fn interpolate(
-        &self,
-        samples: &[usize],
-        group: &[usize],
-        channels: &[&[f64]],
-        wanted: &[f64],
-        found: &mut [Vec<f64>],
-    ) {
-        let (Some(&first), Some(&last)) = (samples.first(), samples.last()) else { return };
-        let times: Vec<f64> = samples.iter().map(|&sample| self.times[sample]).collect();
-        let spline = Spline::new(&times, self.order);
-        let values = |channel: &usize| samples.iter().map(|&sample| channels[*channel][sample]).collect::<Vec<f64>>();
-        let (begin, end) = (self.times[first] - SAME, self.times[last] + SAME);
-        let inside = wanted.partition_point(|&at| at < begin)..wanted.partition_point(|&at| at <= end);
-        let (before, wanted) = (inside.start, &wanted[inside]);
-        if wanted.is_empty() {
-            return;
-        }
-        let values: Vec<Vec<f64>> = group.iter().map(values).collect();
-        let coefficients: Vec<Vec<f64>> = values.iter().map(|values| spline.coefficients(values)).collect();
-        let at = wanted.iter().map(|&at| at.clamp(times[0], times[times.len() - 1]));
-        spline.values(&coefficients, at, |channel, place, value| {
-            found[group[channel]][before + place] = value;
-        });
-        // What was sampled at the wanted times stays as it is, to the last bit.
-        let mut place = 0;
-        for (sample, &time) in times.iter().enumerate() {
-            while place < wanted.len() && wanted[place] < time - SAME {
-                place += 1;
-            }
-            if wanted.get(place).is_some_and(|own| (own - time).abs() <= SAME) {
-                for (channel, values) in group.iter().zip(&values) {
-                    found[*channel][before + place] = values[sample];
+    /// The channels at some times, by splines through the samples of some parts.
+    fn interpolate(&self, mut parts: Vec<SplinedPart>, channels: &[&[f64]], wanted: &[f64]) -> Vec<Vec<f64>> {
+        let mut found = vec![vec![f64::NAN; wanted.len()]; channels.len()];
+        let instructions = Instructions::current();
+        parts.sort_by(|one, other| one.kind().cmp(&other.kind()));
+        let alike = parts.chunk_by(|one, other| one.kind() == other.kind());
+        for parts in alike.flat_map(|parts| parts.chunks(instructions.lanes())) {
+            let times = taken(parts, &self.times);
+            let splines = Splines::new(&slices(&times), self.order, instructions);
+            let of_channel = |channel: &usize| {
+                let values = taken(parts, channels[*channel]);
+                let coefficients = splines.coefficients(&slices(&values));
+                (values, coefficients)
+            };
+            let (values, coefficients): (Vec<_>, Vec<_>) = parts[0].channels.iter().map(of_channel).unzip();
+            for (place, (part, times)) in parts.iter().zip(&times).enumerate() {
+                let inside = |&at: &f64| at.clamp(times[0], times[times.len() - 1]);
+                let at: Vec<f64> = wanted[part.wanted.clone()].iter().map(inside).collect();
+                let coefficients: Vec<&[f64]> = coefficients.iter().map(|parts| parts[place].as_slice()).collect();
+                let splined = splines.values(place, &coefficients, &at);
+                for ((channel, splined), values) in part.channels.iter().zip(&splined).zip(&values) {
+                    let found = &mut found[*channel][part.wanted.clone()];
+                    found.copy_from_slice(splined);
+                    keep_samples((times, &values[place]), &wanted[part.wanted.clone()], found);
                 }
             }
+        }
+        found
+    }
+}
+
+/// The numbers of the samples of some parts.
+fn taken(parts: &[SplinedPart], of: &[f64]) -> Vec<Vec<f64>> {
+    parts.iter().map(|part| part.samples.iter().map(|&sample| of[sample]).collect()).collect()
+}
+
+fn slices(lists: &[Vec<f64>]) -> Vec<&[f64]> {
+    lists.iter().map(Vec::as_slice).collect()
+}
+
+/// What was sampled at the wanted times stays as it is, to the last bit.
+fn keep_samples((times, values): (&[f64], &[f64]), wanted: &[f64], found: &mut [f64]) {
+    let mut place = 0;
+    for (&time, &value) in times.iter().zip(values) {
+        while wanted.get(place).is_some_and(|&own| own < time - SAME) {
+            place += 1;
+        }
+        if wanted.get(place).is_some_and(|own| (own - time).abs() <= SAME) {
+            found[place] = value;
         }
     }
 }
@@ -199,10 +255,9 @@ mod tests {
             let found = resampled(&whole, &samples, 1);
             assert_eq!(found, resampled(&whole, &samples, 3));
             // A spline through all samples at once.
-            let spline = Spline::new(&times, order);
-            let mut expected = vec![0.0; grid];
-            let at = (0..grid).map(|place| (place as f64).max(times[0]));
-            spline.values(&[spline.coefficients(&samples)], at, |_, place, value| expected[place] = value);
+            let splines = Splines::new(&[&times], order, Instructions::current());
+            let at: Vec<f64> = (0..grid).map(|place| (place as f64).max(times[0])).collect();
+            let expected = splines.values(0, &[&splines.coefficients(&[&samples])[0]], &at).remove(0);
             for (one, other) in found.iter().zip(&expected) {
                 assert!((one - other).abs() < 1e-12, "order {order}: {one} {other}");
             }
