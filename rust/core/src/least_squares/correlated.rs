@@ -18,7 +18,7 @@ use crate::least_squares::givens_factor::{MOST_PAIRS, MOST_REGRESSORS};
 use crate::least_squares::plan::{Equations, Regressions, RollingLeastSquares};
 use crate::least_squares::rounds::{Lender, Lent, Rounds, SomeWindows};
 use crate::least_squares::row_fits::{Fits, ProductsOfRows};
-use crate::least_squares::row_products::{RowProducts, pairs, side_by_side};
+use crate::least_squares::row_products::{Pairs, RowProducts, side_by_side};
 use crate::least_squares::side_by_side::RollingScratch;
 use crate::least_squares::sliding_sums::{begin, slide, sliding_sums};
 use crate::record::subsample::stretches;
@@ -303,14 +303,14 @@ impl Sandwich<'_, '_, '_> {
         };
         let neighbours = &neighbours[(from - from_neighbours).unsigned_abs()..];
         let [mut here, mut next] = [here, next].map(|vectors| side_by_side::<P>(vectors, length));
-        let of_pairs = |row: &[f64; N]| pairs::<N, P>(p, row);
-        begin(&neighbours[..length], of_pairs, next);
+        let pairs = Pairs::<R>(p);
+        begin(&neighbours[..length], pairs, next);
         let scale = ErrorScale::new(fits.plan, fits.rows(), bandwidth);
         let counts = (products.first, &*products.counts);
         let skipped = (first - from).unsigned_abs();
         for (block, after) in neighbours[length..].chunks_exact(length).enumerate() {
             std::mem::swap(&mut here, &mut next);
-            slide(after, of_pairs, here, next);
+            slide(after, pairs, here, next);
             // Windows by where they begin after the first block.
             let wanted = skipped.max(block * length)..(skipped + rows.len()).min((block + 1) * length);
             if wanted.is_empty() {

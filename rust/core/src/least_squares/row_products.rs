@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::least_squares::sliding_sums::Summed;
 use crate::record::samples::LARGEST;
 use crate::simd::aligned::Aligned;
 use crate::simd::vectors::{Lanes, MOST_LANES};
@@ -99,17 +100,27 @@ fn multiply_some<S: Lanes, const N: usize, const WHOLE: bool>(
     simd.bits(counted)
 }
 
-/// The products of each pair of the first numbers of a row.
-#[inline(always)]
-pub(crate) fn pairs<const N: usize, const P: usize>(numbers: usize, row: &[f64; N]) -> [f64; P] {
-    let (mut products, mut pair) = ([0.0; P], 0);
-    for i in 0..numbers {
-        for k in i..numbers {
-            products[pair] = row[i] * row[k];
-            pair += 1;
+/// The products of each pair of the first numbers of a row are summed: of `R` numbers, or of so many where that is zero.
+#[derive(Clone, Copy)]
+pub(crate) struct Pairs<const R: usize>(pub(crate) usize);
+
+impl<const R: usize, const N: usize, const P: usize> Summed<[f64; N], P> for Pairs<R> {
+    #[inline(always)]
+    fn of(self, row: &[f64; N]) -> [f64; P] {
+        let numbers = if R == 0 { self.0 } else { R };
+        let (mut products, mut pair) = ([0.0; P], 0);
+        for i in 0..numbers {
+            for k in i..numbers {
+                products[pair] = row[i] * row[k];
+                pair += 1;
+            }
         }
+        // Nobody reads what is beyond them. Where there are several vectors of products, zeros would leave the last of them in parts.
+        if P >= 2 * MOST_LANES {
+            products[pair..].fill(row[0] * row[0]);
+        }
+        products
     }
-    products
 }
 
 #[cfg(test)]

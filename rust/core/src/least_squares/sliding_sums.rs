@@ -3,12 +3,28 @@
 //! So many rows from any row on are a suffix of one block and a prefix of the next. The prefixes of a block and its suffixes are made in
 //! one loop, from both of its ends: each addition waits for the one before it, and two chains of them keep the processor busy.
 
+/// Which numbers of a row are summed. No closure: a large one is compiled on its own, without the instructions of the kernel that calls it.
+pub(crate) trait Summed<T, const N: usize>: Copy {
+    fn of(self, row: &T) -> [f64; N];
+}
+
+/// All of them.
+#[derive(Clone, Copy)]
+pub(crate) struct All;
+
+impl<const N: usize> Summed<[f64; N], N> for All {
+    #[inline(always)]
+    fn of(self, row: &[f64; N]) -> [f64; N] {
+        *row
+    }
+}
+
 /// Replaces the suffixes of a block by the sums over as many rows as a block has, from each of its rows on, and writes the suffixes of the
-/// next block. `of` says which numbers of a row are summed.
+/// next block.
 #[inline(always)]
 pub(crate) fn slide<T, const N: usize>(
     next: &[T],
-    of: impl Fn(&T) -> [f64; N],
+    summed: impl Summed<T, N>,
     sums: &mut [[f64; N]],
     suffixes: &mut [[f64; N]],
 ) {
@@ -16,18 +32,18 @@ pub(crate) fn slide<T, const N: usize>(
     let ends = next.iter().zip(next.iter().rev());
     for ((sum, into), (first, last)) in sums.iter_mut().zip(suffixes.iter_mut().rev()).zip(ends) {
         add(sum, &prefix);
-        add(&mut prefix, &of(first));
-        add(&mut suffix, &of(last));
+        add(&mut prefix, &summed.of(first));
+        add(&mut suffix, &summed.of(last));
         *into = suffix;
     }
 }
 
 /// The suffixes of a first block, which [`slide`] takes for sums to be.
 #[inline(always)]
-pub(crate) fn begin<T, const N: usize>(block: &[T], of: impl Fn(&T) -> [f64; N], suffixes: &mut [[f64; N]]) {
+pub(crate) fn begin<T, const N: usize>(block: &[T], summed: impl Summed<T, N>, suffixes: &mut [[f64; N]]) {
     let mut suffix = [0.0; N];
     for (row, into) in block.iter().zip(suffixes).rev() {
-        add(&mut suffix, &of(row));
+        add(&mut suffix, &summed.of(row));
         *into = suffix;
     }
 }
@@ -38,11 +54,11 @@ pub(crate) fn begin<T, const N: usize>(block: &[T], of: impl Fn(&T) -> [f64; N],
 pub(crate) fn sliding_sums<const N: usize>(length: usize, rows: &[[f64; N]], sums: &mut [[f64; N]]) {
     let (Some(first), blocks) = (rows.get(..length), sums.len() / length) else { return };
     let mut beyond = vec![[0.0; N]; length];
-    begin(first, |row| *row, &mut sums[..length]);
+    begin(first, All, &mut sums[..length]);
     for block in 1..=blocks {
         let (before, after) = sums.split_at_mut(block * length);
         let suffixes = if block < blocks { &mut after[..length] } else { &mut beyond[..] };
-        slide(&rows[block * length..][..length], |row| *row, &mut before[(block - 1) * length..], suffixes);
+        slide(&rows[block * length..][..length], All, &mut before[(block - 1) * length..], suffixes);
     }
 }
 
