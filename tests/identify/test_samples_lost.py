@@ -14,6 +14,7 @@ from scipy.interpolate import make_interp_spline
 import tvident
 from identify.test_real_recordings import FRICTION, carriage, recording
 from parameters import long
+from tvident import Status
 
 Array = npt.NDArray[np.float64]
 
@@ -124,6 +125,26 @@ def test_a_carriage_whose_times_are_shuffled_or_whose_force_is_slower_is_the_sam
         result = tvident.identify(**call, **OF_CARRIAGE)
         for name, (value, stderr) in result.constants.items():
             assert abs(value - whole.constants[name][0]) < 2 * stderr, name
+
+
+@pytest.mark.parametrize("step", [1, 7])
+def test_what_windows_carry_on_into_a_gap_is_not_trusted(step: int) -> None:
+    """All of it was, up to 44 errors off."""
+    simulated = tvident.simulate_torsional_rig(20.0, seed=5, pattern="slider", angle_noise=1e-3)
+    angle = np.array(simulated.angle)
+    gap = slice(8000, 11_000)
+    angle[gap] = np.nan
+    result = tvident.identify(angle, simulated.torque, sample_rate=1000, step=step)
+    reach = result.settings["regression_window"]
+    assert reach < 3000
+    inside = (result.time >= (8000 + reach) / 1000) & (result.time < (11_000 - reach) / 1000)
+    flags = Status.GAP | Status.ILL_CONDITIONED
+    assert (result.status[inside] & flags == flags).all()
+    assert not result.trusted[inside].any()
+    beside = (result.time < 7.9) | (result.time > 11.1)
+    assert result.trusted[beside].all()
+    (said,) = [line for line in result.advice if "no equation is within a quarter of a window" in line]
+    assert "stiffness is carried on there from beside the gap" in said
 
 
 def test_settings_repeat_a_result_with_lost_samples() -> None:

@@ -152,10 +152,27 @@ def unexplained_here(found: _core.Identification, period: float, step: int) -> l
 
 
 def untold_here(found: _core.Identification, windowed: Sequence[str], period: float, step: int) -> list[str]:
-    """Return where the motion tells nothing of what is windowed, and what to do there."""
+    """Return where the motion tells nothing of what is windowed, or no equation does, and what to do there."""
     told_apart = np.asarray(found.condition) <= _core.HARDLY_TOLD_APART
     # Of invalid samples, and where nothing is windowed, the flag is the record's.
-    return untold(untold_samples(found.status) & told_apart, windowed, period * step)
+    flagged = untold_samples(found.status) & told_apart
+    in_gap = np.asarray(found.status & np.uint16(Status.GAP) != 0)
+    return [
+        *untold(flagged & ~in_gap, windowed, period * step),
+        *_carried_on(flagged & in_gap, windowed, period * step),
+    ]
+
+
+def _carried_on(flagged: npt.NDArray[np.bool_], names: Sequence[str], seconds: float) -> list[str]:
+    """Return in which gaps parameters are carried on from equations that are farther than a quarter of a window."""
+    if not (names and flagged.any()):
+        return []
+    words = (
+        f"in {flagged.mean():.1%} of the record (at {_times(flagged, seconds)} s) no equation is within a quarter of a window: "
+        f"{listed(list(names))} is carried on there from beside the gap, and values are not trusted, as nobody knows what it does "
+        "meanwhile"
+    )
+    return [words]
 
 
 def untold(flagged: npt.NDArray[np.bool_], names: Sequence[str], seconds: float) -> list[str]:
