@@ -147,3 +147,27 @@ def test_a_jump_just_before_the_end_loses_nothing_else(seed: int, duration: floa
     assert np.median(np.abs(off)) < 0.005
     off = np.asarray(result.stiffness) / recording.stiffness - 1
     assert np.median(np.abs(off)) < 0.005
+
+
+@pytest.mark.first(1)
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_change_within_a_test_function_is_followed(seed: int) -> None:
+    """As a jump the stiffness was 4 % off within .1 s of the middle, and 150 samples more than five errors, up to 250."""
+    draw, time = np.random.default_rng(seed), np.arange(20_000) / 1000
+    frequencies, phases = np.linspace(0.5, 12, 40), draw.uniform(0, 6, 40)
+    waves = [np.exp(1j * (2 * np.pi * f * time + p)) for f, p in zip(frequencies, phases, strict=True)]
+    angle, velocity, acceleration = (
+        0.02 * np.real(sum((2j * np.pi * f) ** order * wave for f, wave in zip(frequencies, waves, strict=True)))
+        for order in range(3)
+    )
+    later = np.mod(time, 5) - 2.5
+    stiffness = 13 + 3 * np.tanh(later / 0.01) * np.where(np.mod(time, 10) < 5, 1, -1)
+    torque = 0.0123 * acceleration + 0.03 * velocity + stiffness * angle
+    angle, torque = (
+        one + part * one.std() * draw.standard_normal(time.size) for one, part in ((angle, 1e-3), (torque, 0.01))
+    )
+    result = tvident.identify(angle, torque, sample_rate=1000)
+    np.testing.assert_allclose(result.jumps, [2.5, 7.5, 12.5, 17.5], atol=NEAR)
+    off = result.stiffness - stiffness
+    assert np.sqrt(np.mean((off / stiffness)[np.abs(later) < 0.1] ** 2)) < 0.025
+    assert np.count_nonzero(np.abs(off) > 5 * result.stderr["stiffness"]) < 40

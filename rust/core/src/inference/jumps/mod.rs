@@ -4,6 +4,7 @@ pub(crate) mod constants;
 pub(crate) mod jump;
 pub(crate) mod placement;
 pub(crate) mod pulses;
+pub(crate) mod ramps;
 pub(crate) mod search;
 pub(crate) mod shared_windows;
 #[cfg(test)]

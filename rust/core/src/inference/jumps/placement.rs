@@ -46,20 +46,31 @@ impl JumpSearch<'_> {
 
     /// The same where several rows belong to one time, each with signals of its own.
     fn left_of_groups(&self, place: &JumpPlace<'_>) -> Option<Vec<f64>> {
-        let JumpPlace { lines: [before, after], row, over, candidates } = place;
+        let JumpPlace { candidates, .. } = place;
+        let mut left = vec![0.0; candidates.len()];
+        self.each_row(place, |begin, errors| {
+            for (left, candidate) in left.iter_mut().zip((*candidates).clone()) {
+                *left += errors[candidate.saturating_sub(begin).min(errors.len() - 1)].powi(2);
+            }
+        })?;
+        Some(left)
+    }
+
+    /// Hands over the first sample of every row, and what is left of it where the line before the jump holds for so many of its samples: none, one, and so
+    /// on. `None` if too few rows are usable.
+    pub(crate) fn each_row(&self, place: &JumpPlace<'_>, mut take: impl FnMut(usize, &[f64])) -> Option<()> {
+        let JumpPlace { lines: [before, after], row, over, .. } = place;
         let (length, group, per_sample) = (self.function.len(), self.group, self.group as f64 / self.stride as f64);
         let used = || (*over).clone().filter(|&row| self.whole.usable[row]);
         if 2 * used().count() < over.len() {
             return None;
         }
-        let mut left = vec![0.0; candidates.len()];
-        let mut samples = vec![0.0; length];
-        let mut squares = vec![0.0; length + 1];
+        let (mut samples, mut errors) = (vec![0.0; length], vec![0.0; length + 1]);
         for one in used() {
             let begin = self.first + one / group * self.stride - length / 2;
             // The middle of a group lies at its sample.
             let origin = (begin as f64 - self.first as f64) * per_sample + (group as f64 - 1.0) / 2.0 - *row as f64;
-            squares.fill(0.0);
+            errors.fill(0.0);
             let mut total = 0.0;
             let root = self.whole.root(one);
             for (unknown, (&[from, rise], &[to, growth])) in before.iter().zip(after).enumerate() {
@@ -71,20 +82,18 @@ impl JumpSearch<'_> {
                     let (weight, now) = (factor * sample * root, origin + index as f64 * per_sample);
                     let later = to + (now + 1.0) * growth;
                     total += weight * later;
-                    squares[index + 1] += weight * (later - from - now * rise);
+                    errors[index + 1] += weight * (later - from - now * rise);
                 }
             }
-            squares[0] = self.rhs[one] - total;
+            errors[0] = self.rhs[one] - total;
             let mut sum = 0.0;
-            for square in &mut squares {
-                sum += *square;
-                *square = sum * sum;
+            for error in &mut errors {
+                sum += *error;
+                *error = sum;
             }
-            for (left, candidate) in left.iter_mut().zip((*candidates).clone()) {
-                *left += squares[candidate.saturating_sub(begin).min(length)];
-            }
+            take(begin, &errors);
         }
-        Some(left)
+        Some(())
     }
 
     /// The first sample of a row.

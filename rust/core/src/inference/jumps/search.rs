@@ -185,11 +185,12 @@ impl JumpSearch<'_> {
             let lines = [self.lines(windows, row, 0)?, self.lines(windows, row - 1, 2)?];
             let candidates = tau.saturating_sub(half)..tau + half + 1;
             let over = row.saturating_sub(2 * reach)..(row + 2 * reach).min(rows);
-            let left = self.left(&JumpPlace { lines: &lines, row, over: &over, candidates: &candidates })?;
+            let place = JumpPlace { lines: &lines, row, over: &over, candidates: &candidates };
+            let left = self.left(&place)?;
             let best = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]))?;
             let next = candidates.start + best;
             if next.abs_diff(tau) <= self.stride / 2 || round == ROUNDS {
-                let jump = self.jump(&left, best, candidates.start, over.len() as f64);
+                let jump = self.jump_or_ramp(&place, &left, best);
                 return Some((jump, (over, left[best])));
             }
             (tau, round) = (next, round + 1);
@@ -236,7 +237,7 @@ impl JumpSearch<'_> {
     }
 
     /// The variance of one independent row: from the sum of squares, at least that of the noise.
-    fn noise(&self, left: f64, count: f64) -> f64 {
+    pub(crate) fn noise(&self, left: f64, count: f64) -> f64 {
         self.expected.variance_inflation * (self.inflation * self.expected.variance).max(left / count)
     }
 
