@@ -29,6 +29,13 @@ def with_lost(values: Array, part: float, seed: int) -> Array:
     return np.where(np.random.default_rng(seed).random(values.shape) < part, np.nan, values)
 
 
+def with_slow_noise(values: Array, part: float, seed: int) -> Array:
+    slow = np.random.default_rng(seed).standard_normal(values.shape)
+    for place in range(1, SAMPLES):
+        slow[:, place] = 0.9 * slow[:, place - 1] + np.sqrt(1 - 0.9**2) * slow[:, place]
+    return np.asarray(values + part * values.std(axis=1, keepdims=True) * slow)
+
+
 def worst(result: Any, truth: Masses) -> float:
     """Give the largest distance of a constant from the truth, in standard errors."""
     true = dict(zip(("inertia_0", "inertia_1"), truth.inertia, strict=True))
@@ -74,15 +81,21 @@ def test_a_base_that_lost_samples_is_bridged() -> None:
 
 def test_noise_with_a_colour_keeps_it() -> None:
     record = masses(51404)
-    rng = np.random.default_rng(6)
-    slow = rng.standard_normal(record.angle.shape)
-    for place in range(1, SAMPLES):
-        slow[:, place] = 0.9 * slow[:, place - 1] + np.sqrt(1 - 0.9**2) * slow[:, place]
-    angle = record.angle + 3e-3 * record.angle.std(axis=1, keepdims=True) * slow
+    angle = with_slow_noise(record.angle, 3e-3, 6)
     whole = identify(angle, record.torque, **OPTIONS)
     result = identify(with_lost(angle, 0.02, 7), record.torque, **OPTIONS)
     assert compared(result, whole) == pytest.approx(1.0, abs=0.1)
     assert worst(result, record) < 4
+
+
+@pytest.mark.parametrize("slow_part", [0.0, 3e-3])
+def test_progress_is_told_to_the_end(slow_part: float) -> None:
+    record = masses(51404)
+    told: list[float] = []
+    angle = with_lost(with_slow_noise(record.angle, slow_part, 6), 0.02, 7)
+    identify(angle, record.torque, **OPTIONS, progress=lambda done, total: told.append(done / total))
+    assert told == sorted(told)
+    assert told[-1] == 1
 
 
 def test_trials_that_lost_samples_have_errors_of_whole_ones() -> None:
@@ -115,3 +128,25 @@ def test_long_gaps_stay_gaps() -> None:
     assert not any("bridged" in one for one in result.reasons)
     assert (result.status[2000:2100] & int(tvident.Status.GAP)).all()
     assert worst(result, record) < 4
+
+
+@pytest.mark.parametrize("dead", ["angle", "torque", "both", "no weight", "a few samples"])
+def test_a_trial_without_a_channel_tells_nothing_of_the_others(dead: str) -> None:
+    trials = simulated(6, 1500, lambda t: 15 + 0 * t, seed=71111)
+    angle, torque = list(with_lost(trials.angle, 0.05, 8)), list(with_lost(trials.torque, 0.05, 9))
+    options: dict[str, Any] = {"sample_rate": 1000, "ensemble_axis": 0, "stiffness": "constant"}
+    others = [0, 1, 2, 4, 5]
+    of_others = identify([angle[one] for one in others], [torque[one] for one in others], **options)
+    if dead in {"angle", "both"}:
+        angle[3] = np.full_like(angle[3], np.nan)
+    if dead in {"torque", "both"}:
+        torque[3] = np.full_like(torque[3], np.nan)
+    if dead == "no weight":
+        options["weights"] = np.where(np.arange(6)[:, np.newaxis] == 3, 0.0, np.ones((6, 1500)))
+    if dead == "a few samples":
+        angle[3], torque[3] = angle[3][:5], torque[3][:5]
+    result = identify(angle, torque, **options)
+    for name, (value, error) in of_others.constants.items():
+        assert result.constants[name][0] == pytest.approx(value, abs=0.5 * error)
+        assert result.constants[name][1] == pytest.approx(error, rel=0.05)
+    assert result.record_status == of_others.record_status

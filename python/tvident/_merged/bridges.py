@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tvident._clocks import Bridged, bridged
 from tvident._merged.masses import Masses
-from tvident._merged.sampling import variances
+from tvident._merged.sampling import mean_variance, variances
 from tvident._merged.trials import Trials
 from tvident._merged.weighted import spread
 
@@ -103,11 +103,12 @@ def _bridges_of(
     if not said:
         return None
     channels: list[list[Numbers | None]] = []
-    noise = np.zeros((len(trials), len(trials[0])))
+    told: list[tuple[list[float], list[Numbers]]] = [([], []) for _ in trials[0]]
     for trial, (given, over) in enumerate(zip(there, found, strict=True)):
         new = given if over is None else {place: over.channels[str(place)] for place in given}
         channels.append([new.get(place) for place in range(len(trials[trial]))])
         for place, one in new.items():
             passed = None if over is None else over.passed.get(str(place))
-            noise[trial, place] = variances([one], passed)[0] / spread(weights[trial])
-    return Bridges(channels, noise.mean(axis=0).tolist(), said)
+            told[place][0].append(variances([one], passed)[0] / spread(weights[trial]))
+            told[place][1].append(one)
+    return Bridges(channels, [mean_variance(*one) for one in told], said)

@@ -19,7 +19,7 @@ from tvident._merged.merging import Merging, Part
 from tvident._merged.predicted import Equations
 from tvident._merged.recorded import MergedRecorded
 from tvident._merged.result import MergedIdentification
-from tvident._merged.sampling import Sampling, variances
+from tvident._merged.sampling import Sampling, mean_variance, variances
 from tvident._merged.trials import Trials
 
 Numbers = npt.NDArray[np.number]
@@ -100,9 +100,14 @@ class AskedTogether:
             step=self.step,
             workers=self.workers,
         )
-        found = None if is_white else identified(noise=None, progress=None)
-        if found is None or max(found.colours, default=1.0) <= 1:
+        if is_white:
             found = identified(noise=noise, progress=self.report)
+        else:
+            found = identified(noise=None, progress=self._report_of_half(0))
+            if max(found.colours, default=1.0) <= 1:
+                found = identified(noise=noise, progress=self._report_of_half(1))
+            elif self.report is not None:
+                self.report(samples, samples)
         self._check_window(asked["regression_window"], found.regression_window)
         # Nothing was determined: no window was long enough.
         again = replace(self, forms=[{name: getattr(found, name) or None for name in asked}], report=None)
@@ -121,6 +126,11 @@ class AskedTogether:
             f"regression_window must be {bound} about {nearest} samples here, since windows are compared with equations that share no "
             f"samples with them; got {wanted}; use {nearest} or {cure}, or leave it out"
         )
+
+    def _report_of_half(self, half: int) -> Callable[[int, int], object] | None:
+        """Return what reports the first or the second half of the work; None where nothing is to be reported."""
+        report = self.report
+        return None if report is None else lambda done, total: report(half * total + done, 2 * total)
 
     def bridged(self, bridges: Timed | None) -> AskedTogether:
         """Return the same with how short gaps were bridged, if any were."""
@@ -160,7 +170,7 @@ def identify_trials(trials: Trials, asked: AskedTogether, term_values: TermValue
         given.append((angle[np.newaxis], torque[np.newaxis], terms, mask, position, weights))
     passed, noise = asked.sampling.passed, trials.noise
     if passed is not None:
-        angles, torques = ([float(np.mean(variances(one, passed)))] for one in (trials.angles, trials.torques))
+        angles, torques = ([mean_variance(variances(one, passed), one)] for one in (trials.angles, trials.torques))
         noise = angles, torques
     merging = Merging(
         elements,

@@ -14,6 +14,9 @@ from tvident._clocks import Clock, Grid, Passed, Timed, clock_of
 
 Numbers = npt.NDArray[np.number]
 
+_LEAST = 25
+"""Samples that tell noise, at least."""
+
 
 @dataclass(frozen=True)
 class Sampling:
@@ -92,6 +95,16 @@ class Sampling:
 
 
 def variances(channels: Sequence[Numbers], passed: Passed | None) -> list[float]:
-    """Return the variance of the noise of every channel."""
+    """Return the variance of the noise of every channel; NaN of those that are too short to tell, or of which too little is there."""
     noise = None if passed is None else passed.noise
-    return [one.sigma**2 for channel in channels for one in _core.noise(np.asarray(channel), None, noise)]
+    return [_variance(np.asarray(channel), noise) for channel in channels]
+
+
+def mean_variance(found: Sequence[float], channels: Sequence[Numbers]) -> float:
+    """Return the mean of variances that channels of several trials tell, by their samples; 0 where none tells any."""
+    told = {place: np.isfinite(channels[place]).sum() for place, one in enumerate(found) if np.isfinite(one)}
+    return float(np.average([found[place] for place in told], weights=list(told.values()))) if told else 0.0
+
+
+def _variance(channel: Numbers, noise: _core.PassedNoise | None) -> float:
+    return float(_core.noise(channel, None, noise)[0].sigma ** 2) if channel.size >= _LEAST else np.nan

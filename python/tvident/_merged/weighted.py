@@ -57,8 +57,11 @@ def without_missing(channel: Numbers, weights: Array) -> Numbers:
 
 
 def spread(weights: Array | None) -> float:
-    """Return the variance of a channel's noise over that of a sample of weight one."""
-    return 1.0 if weights is None else float(np.mean(1 / weights[weights > 0]))
+    """Return the variance of a channel's noise over that of a sample of weight one; NaN where no sample counts."""
+    if weights is None:
+        return 1.0
+    counted = weights[weights > 0]
+    return float(np.mean(1 / counted)) if counted.size else np.nan
 
 
 def _by_trial(given: Any, lengths: Sequence[int], *, several: bool) -> list[Array]:
