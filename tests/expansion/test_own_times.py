@@ -89,3 +89,50 @@ def test_a_stiffness_that_is_known_may_have_the_clock_of_the_angle() -> None:
     result = tvident.identify(angle, torque, sample_rate=(400.0, 1000.0), stiffness=6 / true(4)[2](ours))
     value, error = result.constants["inertia"]
     assert abs(value - 0.0123) < 4 * error < 0.0004
+
+
+def moving(seed: int) -> tuple[Any, Any, Any]:
+    """Give the angle, the torque and the position of a slider that moves fast, so that stamps that are late tell."""
+    rig = tvident.simulate_torsional_rig(
+        duration=DURATION + 1,
+        sample_rate=2000,
+        seed=seed,
+        pattern=lambda t: 0.5 + 0.3 * np.sin(4 * t),
+        torque_snr_db=200,
+        angle_noise=0,
+    )
+    angle, torque, position = (
+        make_interp_spline(rig.time, one, k=5) for one in (rig.true_angle, rig.true_torque, rig.slider_position)
+    )
+    return angle, torque, position
+
+
+@pytest.mark.parametrize("of", ["angle", "torque"])
+@pytest.mark.parametrize("by", ["seconds", "settings"])
+def test_a_schedule_is_as_late_as_the_clock_that_it_has(by: str, of: str) -> None:
+    ours, theirs = (np.arange(int(one * DURATION)) / one for one in (400.0, 1000.0))
+    angle, torque, position = moving(71000)
+    channels = noisy(angle(ours), 1e-3, 1), noisy(torque(theirs), 1e-2, 2)
+    times = ours, theirs + 0.1
+    schedule = tvident.Expansion("bspline", of=position(ours if of == "angle" else theirs))
+    aligned: dict[str, Any] = {"align": 0.1}
+    if by == "settings":
+        windows = tvident.identify(*channels, t=times, align="offset", inertia="constant", damping="constant")
+        aligned = {"settings": windows.settings}
+    result = tvident.identify(*channels, t=times, stiffness=schedule, **aligned)
+    told, stiffness = result.trusted, 6 / position(result.time)
+    assert told.mean() > 0.97
+    assert np.abs(result.stiffness / stiffness - 1)[told].max() < 2e-3
+
+
+def test_an_alignment_that_is_to_be_found_is_refused_beside_what_depends_on_it() -> None:
+    ours, theirs = (np.arange(int(one * DURATION)) / one for one in (400.0, 1000.0))
+    angle, torque, position = (one for one in true(4))
+    channels = angle(ours), torque(theirs)
+    for known in (tvident.Expansion("bspline", of=position(theirs)), 6 / position(theirs)):
+        with pytest.raises(ValueError, match="what is known at every sample of the torque needs times that are right"):
+            tvident.identify(*channels, t=(ours, theirs), align="offset", stiffness=known)
+    with pytest.raises(ValueError, match="align must be seconds beside an Expansion"):
+        tvident.identify(
+            *channels, t=(ours, theirs), align="drift", stiffness=tvident.Expansion("bspline", of=position(ours))
+        )

@@ -118,6 +118,17 @@ def test_records_of_a_list_have_clocks_of_their_own() -> None:
     assert shared.constants["inertia"][1] < min(one.constants["inertia"][1] for one in each)
 
 
+@pytest.mark.parametrize("channel", ["angle", "torque"])
+def test_missing_samples_are_refused_where_they_are_to_be(channel: str) -> None:
+    channels = {"angle": sampled(1, "angle", clock(800.0), 1e-3), "torque": sampled(1, "torque", clock(300.0), 1e-2)}
+    channels[channel][500] = np.nan
+    identify: Any = tvident.identify
+    with pytest.raises(
+        ValueError, match=f"{channel} must hold finite numbers where nan_policy='raise'; sample 500 is nan"
+    ):
+        identify(**channels, sample_rate=(800.0, 300.0), nan_policy="raise", **CONSTANT)
+
+
 def test_an_offset_is_found_from_the_equation() -> None:
     ours, theirs = clock(1000.0), clock(1000.0, 0.6)
     angle, torque = sampled(2, "angle", ours, 1e-3), sampled(2, "torque", theirs, 0.05)

@@ -62,6 +62,12 @@ class TwoClocks:
             f"a grid of {1 / self.period:.6g} Hz by splines of order {_ORDER}"
         )
 
+    def true_times(self, own: Grid, late: tuple[float, float]) -> Numbers:
+        """Return the times of a clock's samples, whose stamps are late by so many seconds, and by how many more each second."""
+        times = own.start + own.period * own.places
+        offset, drift = late
+        return np.asarray(times - offset - drift * (times - self.start))
+
     def on_grid(
         self, own: Grid, values: npt.NDArray[np.number], late: tuple[float, float] = (0.0, 0.0), *, propagate: bool
     ) -> tuple[Numbers, Passed | None]:
@@ -77,10 +83,8 @@ class TwoClocks:
         propagate : bool
             Nothing is known beside missing values.
         """
-        times = own.start + own.period * own.places
         offset, drift = late
-        true = times - offset - drift * (times - self.start)
-        places = (true - self.start) / self.period
+        places = (self.true_times(own, late) - self.start) / self.period
         if not np.all(np.diff(places) > 0):
             raise ValueError(
                 f"a clock must go on where its stamps are moved; got stamps that are late by {offset:.3g} s and {drift:.3g} s more each "

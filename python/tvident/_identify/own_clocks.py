@@ -68,19 +68,42 @@ class OwnClocks:
     align: Align
     propagate: bool
 
-    def channels(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        """Return angle and torque on the grid, by their stamps."""
+    def channels(self, policy: str) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """Return angle and torque on the grid, by their stamps; a policy for missing values refuses those of the recording."""
+        for name, recorded in zip(("angle", "torque"), self.recorded, strict=True):
+            arguments.check_nan(name, recorded, policy, arguments.RowPolicy)
         return self._angle()[0], self._torque((0.0, 0.0))[0]
 
-    def known(self, values: Any, *, over_gaps: bool = True) -> Any:
-        """Return what is known at every sample of the angle, or of the torque, on the grid along straight lines; else as it is."""
+    def known(self, values: Any, earlier: Mapping[str, Any] | None, *, over_gaps: bool = True) -> Any:
+        """Return what is known at every sample of the angle, or of the torque, on the grid along straight lines; else as it is.
+
+        Parameters
+        ----------
+        values : object
+        earlier : mapping, optional
+            Settings of an earlier result, whose alignment is taken where none is asked for.
+        over_gaps : bool, optional
+            Something is known where the clock lost samples, and where it does not reach.
+        """
         clocks = zip((self.clocks.angle, self.clocks.torque), self.recorded, strict=True)
         own = next((clock for clock, recorded in clocks if np.shape(values)[-1:] == recorded.shape), None)
         if own is None:
             return values
+        late = (0.0, 0.0) if own is self.clocks.angle else self._late_by(earlier)
+        if late is None:
+            raise ValueError(
+                f"what is known at every sample of the torque needs times that are right; got align={self.align!r}; give it at the samples "
+                "of the angle, or the offset in seconds: align=0.01, say"
+            )
+        places = own.places
+        if any(late):
+            places = (self.clocks.true_times(own, late) - own.start) / own.period
         wanted = (self.clocks.time - own.start) / own.period
-        found = np.interp(wanted, own.places, np.asarray(values, dtype=np.float64))
-        return found if over_gaps else np.where(in_no_gap(own.places, wanted, own.longest), found, np.nan)
+        found = np.interp(wanted, places, np.asarray(values, dtype=np.float64))
+        if over_gaps:
+            return found
+        is_inside = (wanted > places[0] - 0.5) & (wanted < places[-1] + 0.5)
+        return np.where(is_inside & in_no_gap(places, wanted, own.longest), found, np.nan)
 
     def finished(
         self,
@@ -110,13 +133,8 @@ class OwnClocks:
                 data, torques=scaled(torque, factor), time=self.clocks.time, passed=(passed, of_torque), labels=None
             )
 
-        found = Aligned((0.0, 0.0), (0.0, 0.0))
-        if isinstance(self.align, str):
-            found = aligned(data_of, lag_of, self.align)
-        elif self.align is not None:
-            found = Aligned((float(self.align), 0.0), (0.0, 0.0))
-        elif earlier is not None and earlier.get("times") == "own":
-            found = Aligned((float(earlier["clock_offset"]), float(earlier["clock_drift"])), (0.0, 0.0))
+        late = self._late_by(earlier)
+        found = aligned(data_of, lag_of, str(self.align)) if late is None else Aligned(late, (0.0, 0.0))
         constants = {"clock_offset": ([found.late[0]], [found.errors[0]])}
         if self.align == "drift":
             constants["clock_drift"] = ([found.late[1]], [found.errors[1]])
@@ -132,6 +150,16 @@ class OwnClocks:
 
         moved = [partial(change, move) for move in found.moves]
         return replace(final, motion=motion, doubts=doubts, clock=ClockAlignment(self.clocks, found.late), moved=moved)
+
+    def _late_by(self, earlier: Mapping[str, Any] | None) -> Late | None:
+        """Return by how much stamps of the torque are late; None where that is to be found."""
+        if isinstance(self.align, str):
+            return None
+        if self.align is not None:
+            return float(self.align), 0.0
+        if earlier is not None and earlier.get("times") == "own":
+            return float(earlier["clock_offset"]), float(earlier["clock_drift"])
+        return 0.0, 0.0
 
     def _angle(self) -> tuple[npt.NDArray[np.float64], Passed | None]:
         return self.clocks.on_grid(self.clocks.angle, self.recorded[0], propagate=self.propagate)
@@ -196,7 +224,8 @@ def own_clocks(
     for one, array in (("angle", angle), ("torque", torque)):
         if array.ndim != 1:
             raise ValueError(
-                f"clocks are aligned for a single record; got {one} of shape {array.shape}; take one at a time"
+                f"clocks are aligned for a single record; got {one} of shape {array.shape}; give lists of records and of their clocks, "
+                "sample_rate=[(1000, 250), (1000, 250)], say, or take one at a time"
             )
     of_angle, of_torque = value if name in pairs else (value, value)
     if name == "t" and name in pairs:

@@ -83,7 +83,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
     )
     torque = call["torque"]
     if clocks is not None:
-        measured["angle"], torque = clocks.channels()
+        measured["angle"], torque = clocks.channels(call["nan_policy"])
         sampling = {"sample_rate": 1 / clocks.clocks.period, "delta": None, "t": None}
     *arrays, torques = arguments.channels(**measured, torque=torque)
     channels = dict(zip(measured, arrays, strict=True))
@@ -127,7 +127,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         signals, request = signals.on_grid(
             grid, request, call["settings"], propagate=propagate, workers=call["workers"]
         )
-    request = _on_clocks(request, clocks)
+    request = _on_clocks(request, clocks, call["settings"])
     is_bridged = grid is None and clocks is None and not propagate and isinstance(request.form, WeakForm)
     if is_bridged:
         signals, request = signals.over_holds(request, call["settings"], workers=call["workers"])
@@ -167,9 +167,12 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
     return task(data, request)
 
 
-def _on_clocks(request: Request, clocks: OwnClocks | None) -> Request:
+def _on_clocks(request: Request, clocks: OwnClocks | None, earlier: Mapping[str, Any] | None) -> Request:
     """Return a request with what is known at every sample on the grid of two clocks, where there are two."""
-    return request if clocks is None else with_known(request, clocks.known, partial(clocks.known, over_gaps=False))
+    if clocks is None:
+        return request
+    known = partial(clocks.known, earlier=earlier)
+    return with_known(request, known, partial(known, over_gaps=False))
 
 
 def _has_expansions(call: Mapping[str, Any]) -> bool:
@@ -203,6 +206,11 @@ def _lag_left(request: Request, data: Data) -> tuple[float, float]:
     if isinstance(request.form, StrongForm):
         raise ValueError(  # noqa: TRY004 - a method, but not one that will do
             "align needs the weak form; got the strong form; use WeakForm, or give the offset as a number"
+        )
+    if expansions_of(request):
+        raise ValueError(
+            "align must be seconds beside an Expansion; got a word; identify windows with it first, and give settings= of that result, or "
+            "the offset that it found"
         )
     looking = replace(request, lag="auto", lag_samples=None, by_record={})
     return lag_found(Task(data, looking).run(None, diagnose=False).settings)
