@@ -108,7 +108,13 @@ def test_records_of_a_list_have_clocks_of_their_own() -> None:
     each = [tvident.identify(*one, sample_rate=(800.0, 300.0), **CONSTANT) for one in zip(angles, torques, strict=True)]
     times = [(clock(800.0)[: one.size] - 0.5, clock(300.0) - 0.5) for one in angles]
     identify: Any = tvident.identify
-    for said in ({"sample_rate": (800.0, 300.0)}, {"sample_rate": [(800.0, 300.0)] * 3}, {"t": times}):
+    of_rates: list[dict[str, Any]] = [
+        {"sample_rate": (800.0, 300.0)},
+        {"sample_rate": [(800.0, 300.0)] * 3},
+        {"t": times},
+    ]
+    of_periods: list[dict[str, Any]] = [{"delta": (1 / 800, 1 / 300)}, {"delta": [(1 / 800, 1 / 300)] * 3}]
+    for said in (*of_rates, *of_periods):
         for found, alone in zip(identify(angles, torques, **said, **CONSTANT), each, strict=True):
             assert found.constants["stiffness"] == pytest.approx(alone.constants["stiffness"], rel=1e-9)
     # Two records of one length have two rates between them, unless those of angle and torque differ.

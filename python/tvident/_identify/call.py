@@ -63,7 +63,7 @@ def identify(
     torque: npt.ArrayLike,
     *,
     sample_rate: float | tuple[float, float] | None = None,
-    delta: float | None = None,
+    delta: float | tuple[float, float] | None = None,
     t: npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
     angle_unit: str | None = None,
     torque_unit: str | None = None,
@@ -126,8 +126,8 @@ def identify(
     sample_rate : float or (float, float)
         Samples per second. Give exactly one of `sample_rate`, `delta` and `t`, or an angle with an index of dates. Two numbers are
         the rates of angle and torque, which begin at the same time and may have different lengths; a list has one such pair a record.
-    delta : float
-        Sample period in seconds.
+    delta : float or (float, float)
+        Sample period in seconds; two of them, and lists, as rates.
     t : array_like, shape (n,)
         Time of every sample: seconds, dates or durations, which increase. Dates, in any time zone, become seconds from the first sample on.
         Where times are uniform to a thousandth of the sample period, or within the digits that they were printed with, only the sample

@@ -26,6 +26,9 @@ _OTHERS = ("sample_rate", "delta", "lag", "inertia", "damping", "stiffness", "se
 _OF_RECORDS = frozenset({"settings", "sample_rate", "delta", "lag"})
 """Those of which a list has one for every record, and nothing else."""
 
+_RATES = ("sample_rate", "delta")
+"""Those that may be two numbers, of the angle and of the torque."""
+
 _PAIR = 2
 """Clocks: that of the angle and that of the torque."""
 
@@ -58,8 +61,9 @@ def calls_of_records(call: Mapping[str, Any], share: Sequence[str]) -> list[dict
     elif count is None or not (_differ(call) or _have_two_clocks(call)):
         return None
     _check_each_is_one(call)
-    if _is_two_rates(call["sample_rate"]) and (count != _PAIR or _lengths_differ(call)):
-        call = {**call, "sample_rate": [call["sample_rate"]] * count}
+    for name in _RATES:
+        if _is_two_rates(call[name]) and (count != _PAIR or _lengths_differ(call)):
+            call = {**call, name: [call[name]] * count}
     calls: list[dict[str, Any]] = [{} for _ in range(count)]
     for name, value in call.items():
         for place, one in enumerate(_each(name, value, count)):
@@ -76,10 +80,9 @@ def _differ(call: Mapping[str, Any]) -> bool:
 
 def _have_two_clocks(call: Mapping[str, Any]) -> bool:
     """Return whether angle and torque of records have each a clock of their own: such records are no batch."""
-    rate, times = call["sample_rate"], call["t"]
-    of_each = [*(rate if isinstance(rate, list) else ()), *(times if isinstance(times, list) else ())]
+    of_each = [one for name in (*_RATES, "t") if isinstance(call[name], list) for one in call[name]]
     return any(_is_two_rates(one) or _is_two_times(one) for one in of_each) or (
-        _is_two_rates(rate) and _lengths_differ(call)
+        any(_is_two_rates(call[name]) for name in _RATES) and _lengths_differ(call)
     )
 
 

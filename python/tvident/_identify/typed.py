@@ -21,7 +21,7 @@ class GivenArguments(TypedDict, total=False):
     """Options of :func:`tvident.identify`; what decides of which class the result is stands in its overloads."""
 
     sample_rate: float | tuple[float, float] | None
-    delta: float | None
+    delta: float | tuple[float, float] | None
     t: npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike] | None
     angle_unit: str | None
     torque_unit: str | None
