@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
 import tvident
 from tvident import Status
@@ -74,3 +76,48 @@ def test_friction_that_drives_the_motion_is_none() -> None:
         assert found.value("coulomb").value * factor > 0
         assert can_be("coulomb", found) == (factor > 0)
         assert can_be("offset", found)
+
+
+def rubbing() -> tuple[Any, Any, Any]:
+    """Give angle and torque of a machine with dry friction, and its damping, which drifts."""
+    samples, rate = 70_000, 500.0
+    rng, t = np.random.default_rng(71402), np.arange(samples) / rate
+    waves = [(2 * np.pi * one, rng.uniform(0, 2 * np.pi)) for one in np.linspace(0.5, 12, 24)]
+    angle, velocity, acceleration = np.zeros((3, samples))
+    for omega, phase in waves:
+        angle += 0.01 * np.sin(omega * t + phase)
+        velocity += 0.01 * omega * np.cos(omega * t + phase)
+        acceleration -= 0.01 * omega**2 * np.sin(omega * t + phase)
+    damping = 0.02 * (1 + 0.4 * np.sin(2 * np.pi * t / 280))
+    torque = 0.0123 * acceleration + damping * velocity + 13 * angle + 0.01 * np.sign(velocity)
+    angle, torque = (one + 1e-3 * one.std() * rng.standard_normal(samples) for one in (angle, torque))
+    return angle, torque, damping
+
+
+def test_what_a_part_finds_elsewhere_is_compared_with_the_whole_record_there() -> None:
+    """Beside dry friction a damping that drifts is 16 errors off; a part hardly tells it, as it is nearly constant there."""
+    angle, torque, damping = rubbing()
+    result = tvident.identify(angle, torque, sample_rate=500)
+    off = result.damping - damping
+    advice = next(line for line in result.advice if "coulomb" in line)
+    assert np.median(np.abs(off) / result.stderr["damping"]) > 5
+    found = re.search(r"damping becomes ([0-9.]+) ± ([0-9.]+) N m s/rad at ([0-9.]+)-([0-9.]+) s", advice)
+    assert found is not None, advice
+    value, error, begin, end = map(float, found.groups())
+    there = (result.time >= begin) & (result.time <= end)
+    assert abs(value - np.median(damping[there])) < max(4 * error, 0.01 * value)
+    assert result.summary().startswith("do not trust: another equation explains more, and finds another damping")
+
+
+@pytest.mark.parametrize("how", ["angle", "mask"])
+def test_a_part_of_which_nothing_is_there_is_not_the_busiest(how: str) -> None:
+    angle, torque, _ = rubbing()
+    torque[16384:32768] *= 1.2
+    missing = np.zeros(angle.size, bool)
+    missing[16000:33000] = True
+    if how == "angle":
+        angle = np.where(missing, np.nan, angle)
+    mask = ~missing if how == "mask" else None
+    result = tvident.identify(angle, torque, sample_rate=500, mask=mask)
+    assert any("try terms=['offset', 'coulomb']" in line for line in result.advice)
+    assert result.summary().startswith("do not trust: another equation explains more")

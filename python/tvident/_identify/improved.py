@@ -170,17 +170,22 @@ class TriedInWeakForm(_AskedOfRecord):
         return self.run(replace(request, period=self.request.period), data.stretch(some), diagnose=True)
 
 
-def _busiest(torque: Any, length: int) -> slice:
-    """Return the part of a record, of so many samples, in which the middle half of the torque spreads most."""
-    parts = [slice(first, first + length) for first in range(0, torque.size - length + 1, length)]
+def _busiest(data: Data, length: int) -> slice:
+    """Return the part of a record, of so many samples, in which the middle half of the torque spreads most where anything is told."""
+    torque, angle, mask = data.torques, data.angles, data.mask
+    # An odd step meets every sample of what comes at even ones.
+    every = (length // _READ) | 1
+    starts = range(0, torque.size - length + 1, length)
 
-    def spread(part: slice) -> float:
-        some = torque[part][:: max(1, length // _READ)]
-        there = some[np.isfinite(some)]
+    def spread(start: int) -> float:
+        some = slice(start, start + length, every)
+        is_there = np.isfinite(torque[some]) & np.isfinite(angle[some])
+        there = torque[some][is_there if mask is None else is_there & mask[some]]
         # Half a part that is missing tells half as much.
         return float(np.subtract(*np.percentile(there, [75, 25]))) * there.size if there.size else 0.0
 
-    return max(parts, key=spread)
+    first = max(starts, key=spread)
+    return slice(first, first + length)
 
 
 @dataclass(frozen=True)
@@ -241,12 +246,15 @@ class Improvement(_AskedOfRecord):
             identify = partial(self._identify, data.stretch(some))
             try:
                 found = identify(**given, terms=self.asked_terms, lag=self.request.lag, diagnose=True)
+                there = result.between(*data.time[some][[0, -1]].tolist())
             except ValueError:
                 # So little of the part is there that nothing can be identified in it.
                 found = None
             if found is not None:
                 is_as_asked = self.request.lag != "auto"
-                return Trial(identify, found, given, self.asked_terms, self._suspects, is_as_asked, beyond_chance)
+                return Trial(
+                    identify, found, given, self.asked_terms, self._suspects, is_as_asked, beyond_chance, there
+                )
         again = partial(self._identify, data)
         return Trial(again, result, self.given, self.asked_terms, self._suspects, self._is_as_asked, beyond_chance)
 
@@ -255,7 +263,7 @@ class Improvement(_AskedOfRecord):
         """The part of a long record that tells as much of its equation as the whole; None of other records."""
         part = max(_PART, _FUNCTIONS * (self.found.window_length or 0))
         is_long = self.data.is_plain and self.data.time.size >= max(_LONG, 2 * part)
-        return _busiest(self.data.torques, part) if is_long else None
+        return _busiest(self.data, part) if is_long else None
 
     @property
     def _is_as_asked(self) -> bool:

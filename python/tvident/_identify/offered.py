@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from tvident._arguments import with_error
 from tvident._equation import BUILT_IN
-from tvident._results import Identification, median_of
+from tvident._results import BECOMES, Identification, median_of
 from tvident._status import DOUBTFUL_RECORD, Status
 
 BEYOND_CHANCE = 4.0
@@ -16,6 +21,15 @@ NEXT_TO_NOTHING = 0.01
 
 NEARLY_ALL = 0.1
 """What explains nearly all that was left leaves at most this part of it."""
+
+MATTERS = 0.01
+"""A share of a parameter by which it must move to be told."""
+
+_ELSEWHERE = 3.0
+"""Standard errors from which on a better equation finds a parameter elsewhere."""
+
+SUSPECTED = Status.TERM_SUSPECTED | Status.LAG_SUSPECTED
+"""Flags of what may be missing."""
 
 _AGAINST = 0.1
 """A share of a weight that a negative stiffness beside it may have: with more the two are distinguished by nothing."""
@@ -91,3 +105,46 @@ def holds(share: float, flags: int) -> bool:
     if flags & Status.RANK_DEFICIENT:
         return False
     return share <= NEXT_TO_NOTHING or not flags & DOUBTFUL_RECORD
+
+
+def moved(
+    found: Identification,
+    before: Identification,
+    at_hand: Identification | None,
+    unknown: Sequence[str],
+    *,
+    is_more: bool,
+) -> str:
+    """Return which parameters a better equation finds elsewhere, in words.
+
+    Parameters
+    ----------
+    found : Identification
+        With the better equation.
+    before : Identification
+        Of the same samples, with the equation at hand.
+    at_hand : Identification, optional
+        What the whole record tells of them, where they are a part of it.
+    unknown : sequence of str
+        What was not given.
+    is_more : bool
+        Whether the better equation has more in it: then it may find that parameters never varied.
+    """
+    kinds, now, words = found.settings["kinds"], at_hand or before, []
+    # What changes has that median there, and another elsewhere.
+    begin, end = found.time[[0, -1]].tolist()
+    digits = max(0, 2 - math.floor(math.log10(end - begin))) if end > begin else 0
+    place = "" if at_hand is None else f" at {begin:.{digits}f}-{end:.{digits}f} s"
+    for name in unknown:
+        if kinds[name] == "known":
+            continue
+        (was, error), (is_now, least) = median_of(now, name), median_of(found, name)
+        if kinds[name] == now.settings["kinds"][name] and now.record_status & SUSPECTED:
+            # Errors beside something that is suspected hold what it changes, which is asked here.
+            error = least
+        is_moved = abs(is_now - was) > max(_ELSEWHERE * np.hypot(error, least), MATTERS * abs(is_now))
+        is_settled = is_more and before.settings["kinds"][name] == "varying" and kinds[name] == "constant"
+        if is_moved or is_settled:
+            where = " and constant" + place if is_settled else place if kinds[name] != "constant" else ""
+            words.append(f", {name}{BECOMES}{with_error(is_now, least)} {found.units[name]}{where}")
+    return "".join(words)

@@ -15,15 +15,18 @@ from tvident._identify.growths import GROWTHS
 from tvident._identify.left_over import AS_GOOD, Left, Unexplained, unexplained
 from tvident._identify.offered import (
     BEYOND_CHANCE,
+    MATTERS,
     NEARLY_ALL,
+    SUSPECTED,
     Remedy,
     are_distinguished,
     can_be,
     feeds_energy,
     holds,
     is_there,
+    moved,
 )
-from tvident._results import BECOMES, Identification, median_of
+from tvident._results import Identification
 from tvident._status import DOUBTFUL_RECORD, Status
 
 _WORTH = 0.9
@@ -44,15 +47,7 @@ _ENOUGH = 0.2
 _FAR_SMALLER = 1 / 3
 """What predicts as much is advised where an error falls to this part or below."""
 
-_ELSEWHERE = 3.0
-"""Standard errors from which on a better equation finds a parameter elsewhere."""
-
-_MATTERS = 0.01
-"""A share of a parameter by which it must move to be told."""
-
-_SUSPECTED = Status.TERM_SUSPECTED | Status.LAG_SUSPECTED
-
-_LEFT_OVER = Status.RANK_DEFICIENT | Status.ILL_CONDITIONED | Status.NOISE_MODEL | _SUSPECTED | Status.CHANNEL_SUSPECTED
+_LEFT_OVER = Status.RANK_DEFICIENT | Status.ILL_CONDITIONED | Status.NOISE_MODEL | SUSPECTED | Status.CHANNEL_SUSPECTED
 """Flags of a record whose equations leave something over, or tell nothing apart."""
 
 _CONTRADICTED = _LEFT_OVER | Status.SCALES_DISAGREE | Status.KIND_CONTRADICTED
@@ -81,6 +76,8 @@ class Trial:
         Whether the result is what ``identify`` gives for what was asked for.
     beyond_chance : sequence of str
         Those of them that explain a part of what the result leaves, beside all that it found to change.
+    at_hand : Identification, optional
+        What was found of these samples where they are a part of a record, which is what advice is about.
     """
 
     identify: Callable[..., Identification]
@@ -90,6 +87,7 @@ class Trial:
     suspects: Sequence[str]
     is_as_asked: bool = False
     beyond_chance: Sequence[str] = ()
+    at_hand: Identification | None = None
     _now: dict[int | None, Unexplained] = field(default_factory=dict, init=False, repr=False)
     _beside: dict[int, dict[str, Identification]] = field(default_factory=dict, init=False, repr=False)
 
@@ -412,27 +410,15 @@ class Trial:
         except ValueError:
             return False
         return any(
-            abs(growth.value) > max(BEYOND_CHANCE * growth.stderr, _MATTERS * abs(found.value(name).value))
+            abs(growth.value) > max(BEYOND_CHANCE * growth.stderr, MATTERS * abs(found.value(name).value))
             for name, terms in growing.items()
             for growth in (found.value(term.name) for term in terms)
         )
 
     def _moved(self, found: Identification, *, is_more: bool = True) -> str:
         """Return which parameters a better equation finds elsewhere, in words; one with more in it may find that they never varied."""
-        kinds, words = self.result.settings["kinds"], []
-        for name in COEFFICIENTS:
-            if not isinstance(self.given[name], str) or found.settings["kinds"][name] == "known":
-                continue
-            (before, error), (after, least) = median_of(self.result, name), median_of(found, name)
-            if kinds[name] == found.settings["kinds"][name] and self.result.record_status & _SUSPECTED:
-                # Errors beside something that is suspected hold what it changes, which is asked here.
-                error = least
-            is_moved = abs(after - before) > max(_ELSEWHERE * np.hypot(error, least), _MATTERS * abs(after))
-            is_settled = is_more and kinds[name] == "varying" and found.settings["kinds"][name] == "constant"
-            if is_moved or is_settled:
-                constant = " and constant" if is_settled else ""
-                words.append(f", {name}{BECOMES}{with_error(after, least)} {found.units[name]}{constant}")
-        return "".join(words)
+        unknown = [name for name in COEFFICIENTS if isinstance(self.given[name], str)]
+        return moved(found, self.result, self.at_hand, unknown, is_more=is_more)
 
     def _change(self, one: str, found: Identification) -> str:
         """Return how a suspect is given."""
