@@ -116,5 +116,15 @@ def test_channels_in_groups_are_named_with_dots_or_slashes() -> None:
     assert recordings.channel(channels, "rig/angle", "x.h5") is channels["rig.angle"]
     assert recordings.channel(channels, "/rig/torque", "x.h5") is channels["rig.torque"]
     assert recordings.channel(channels, "rig.angle/old", "x.h5") is channels["rig.angle/old"]
-    with pytest.raises(KeyError, match="has no channel 'rig/speed'"):
-        recordings.channel(channels, "rig/speed", "x.h5")
+    for name in ("rig/speed", "/0", "/", "rig/"):
+        with pytest.raises(KeyError, match=f"has no channel '{name}'"):
+            recordings.channel(channels, name, "x.h5")
+
+
+def test_slashes_leave_off_what_dots_leave_off() -> None:
+    channels = {"test.Rig.angle [deg]": np.arange(3.0), "test.Rig.torque": np.ones(3)}
+    for name in ("test/Rig/angle", "test/rig/angle", "Rig/angle", "/angle"):
+        assert recordings.channel(channels, name, "x.h5") is channels["test.Rig.angle [deg]"]
+    several = {"one.rig.angle": np.ones(3), "two.rig.angle": np.ones(3)}
+    with pytest.raises(KeyError, match="has no channel 'rig/angle'"):
+        recordings.channel(several, "rig/angle", "x.h5")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 import numpy.typing as npt
@@ -160,8 +161,9 @@ def full_name(channels: Mapping[str, Any], name: str, source: str) -> str:
         same = folded
     # Who knows the file writes its groups with slashes.
     dotted = name.strip("/").replace("/", ".")
-    if not same and dotted in channels:
-        return dotted
+    if not same and dotted not in {"", name} and not _NUMBER.fullmatch(dotted):
+        with suppress(KeyError):
+            return full_name(channels, dotted, source)
     place, asked = printable(source), printable(name)
     same = same or inside
     if same:
