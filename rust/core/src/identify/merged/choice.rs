@@ -8,7 +8,7 @@ use crate::identify::merged::session::MergedSession;
 use crate::identify::merged::system::Multiplied;
 use crate::noise::channel::weighted_variance;
 use crate::noise::spectrum::power_in_pieces;
-use crate::record::samples::Samples;
+use crate::record::samples::{Samples, is_usable};
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 use crate::weak_form::test_function_choice::{Candidates, Evidence, half_widths, spectrum_length};
 
@@ -28,18 +28,26 @@ pub(crate) fn noise_of(session: &mut MergedSession<'_, '_, '_>) -> Result<[Vec<f
         pieces.extend(channels.map(|one| Piece { size: one.len(), content: (*one, trial.weights) }));
     }
     let level = |(channel, weights): (&dyn Samples, Option<&[f64]>), (): &mut ()| {
-        (weighted_variance(channel, weights, None, instructions), channel.len())
+        (weighted_variance(channel, weights, None, instructions), counted(channel, weights))
     };
     let levels = session.stages.map(pieces, || (), level)?;
     let each = merged.channels() + merged.equations();
     let mean = |place: usize| {
-        let of = levels.iter().skip(place).step_by(each).filter(|(variance, _)| variance.is_finite());
+        let of = levels.iter().skip(place).step_by(each);
         let (sum, weights) = of.fold((0.0, 0.0), |(sum, weights), (variance, samples)| {
             (sum + variance * *samples as f64, weights + *samples as f64)
         });
         if weights > 0.0 { sum / weights } else { 0.0 }
     };
     Ok([(0..merged.channels()).map(mean).collect(), (merged.channels()..each).map(mean).collect()])
+}
+
+/// Samples of a channel that are there and have a weight: a trial that lacks a channel tells nothing of its noise.
+fn counted(channel: &dyn Samples, weights: Option<&[f64]>) -> usize {
+    let mut samples = vec![0.0; channel.len()];
+    channel.read(0, &mut samples);
+    let weight = |place: usize| weights.is_none_or(|weights| weights[place] > 0.0);
+    samples.iter().enumerate().filter(|&(place, sample)| is_usable(*sample) && weight(place)).count()
 }
 
 impl MergedSession<'_, '_, '_> {
