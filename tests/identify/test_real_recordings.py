@@ -212,10 +212,11 @@ def test_what_disagrees_with_what_is_said_of_this_record(folder_of_recordings: P
     channels = recordings.read(recording(folder_of_recordings, "emps.mat"))
     force = channels["gtau"] * channels["vir"]
     result = tvident.identify(channels["qm"], force, sample_rate=1000, angle_unit="m", torque_unit="N")
-    words = result.summary()
-    assert re.search(
-        r"test functions of 11 to \d+ samples all find damping 37\d\.\d ± 4\.4 N s/m, not the 193 ± 24 above", words
-    )
+    words, damping = result.summary(), result.value("damping")
+    # It depends on where windows end beside the jumps of a stiffness that is none, by less than a fifth of its error.
+    assert abs(damping.value - 193) < 0.2 * damping.stderr
+    found = r"test functions of 11 to \d+ samples all find damping 37\d\.\d ± 4\.4 N s/m"
+    assert re.search(rf"{found}, not the {damping.value:.0f} ± {damping.stderr:.0f} above", words)
     assert "none can be trusted" not in words
 
 
