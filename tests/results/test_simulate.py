@@ -267,6 +267,17 @@ def test_a_long_record_is_told_by_stretches_of_it(stiffness: Any, monkeypatch: p
 
 
 @pytest.mark.slow
+def test_stretches_tell_of_a_spring_that_is_relaxed_at_another_angle() -> None:
+    """The whole was identified once more, and less of it foreseen over longer gaps."""
+    rig = tvident.simulate_torsional_rig(800.0, seed=5, pattern="slider", angle_noise=1e-3)
+    about_zero = tvident.identify(rig.angle, rig.torque, sample_rate=1000).held_back()
+    moved = tvident.identify(rig.angle + 0.6 * rig.angle.std(), rig.torque, sample_rate=1000)
+    assert "angle_zero" in moved.constants
+    assert moved.held_back().stretch == about_zero.stretch
+    assert moved.held_back().predicted == pytest.approx(about_zero.predicted, abs=0.1)
+
+
+@pytest.mark.slow
 def test_a_long_record_whose_stretches_are_lost_is_told_by_all_of_it() -> None:
     long = tvident.simulate_torsional_rig(660.0, pattern="constant", seed=5)
     angle = long.angle.copy()

@@ -270,12 +270,7 @@ class Simulated:
     def _is_told_by_stretches(self) -> bool:
         """Whether stretches of the record are records of their own, in which what is not windowed can be taken as known."""
         recorded = self._recorded
-        return (
-            recorded is not None
-            and recorded.again_in is not None
-            and not self.settings["own_terms"]
-            and "angle_zero" not in self.constants
-        )
+        return recorded is not None and recorded.again_in is not None and not self.settings["own_terms"]
 
     def _hold_back_of(self, ends: list[slice], length: int) -> HeldBack:
         """Return the same of ends of stretches of a long record. What is not windowed can hardly follow so few samples, and is known."""
