@@ -144,7 +144,7 @@ def unexplained_here(found: _core.Identification, period: float, step: int) -> l
     if found.outside_mask is not None or not flagged.any():
         return []
     words = (
-        f"in {flagged.mean():.1%} of the record (at {_times(flagged, period * step)} s) the residual exceeds what the noise explains: was "
+        f"{_where(flagged, period * step)} the residual exceeds what the noise explains: was "
         "the machine touched, does something change there that no window follows, or is the noise larger? Errors are larger there, and "
         "values not trusted: mask these samples, or give weights="
     )
@@ -168,7 +168,7 @@ def _carried_on(flagged: npt.NDArray[np.bool_], names: Sequence[str], seconds: f
     if not (names and flagged.any()):
         return []
     words = (
-        f"in {flagged.mean():.1%} of the record (at {_times(flagged, seconds)} s) no equation is within a quarter of a window: "
+        f"{_where(flagged, seconds)} no equation is within a quarter of a window: "
         f"{listed(list(names))} is carried on there from beside the gap, and values are not trusted, as nobody knows what it does "
         "meanwhile"
     )
@@ -180,15 +180,16 @@ def untold(flagged: npt.NDArray[np.bool_], names: Sequence[str], seconds: float)
     if not (names and flagged.any()):
         return []
     words = (
-        f"in {flagged.mean():.1%} of the record (at {_times(flagged, seconds)} s) the motion tells nothing of "
+        f"{_where(flagged, seconds)} the motion tells nothing of "
         f"{listed(list(names))}: errors are as large as anything that the torques of this record suggest, and values are not trusted: "
         "drive the machine there, or make it constant or 'varying', if it is"
     )
     return [words]
 
 
-def _times(flagged: npt.NDArray[np.bool_], seconds: float) -> str:
-    """Return when samples are flagged, so many seconds apart."""
+def _where(flagged: npt.NDArray[np.bool_], seconds: float) -> str:
+    """Return in how much of a record samples are flagged, and when; they are so many seconds apart."""
     begins, ends = stretches_of(flagged)
     shown = ", ".join(f"{a * seconds:.4g}-{b * seconds:.4g}" for a, b in list(zip(begins, ends, strict=True))[:_SHOWN])
-    return shown + (" …" if begins.size > _SHOWN else "")
+    more = " …" if begins.size > _SHOWN else ""
+    return f"in {flagged.mean():.1%} of the record (at {shown}{more} s)"

@@ -169,6 +169,19 @@ pub(crate) fn best_length(
     Ok(best)
 }
 
+/// So many lengths on either side of the one that was best before are tried first.
+const NEAR: usize = 2;
+
+/// Lengths near one of so many, by their places.
+pub(crate) fn near(place: usize, count: usize) -> Range<usize> {
+    place.saturating_sub(NEAR)..(place + NEAR + 1).min(count)
+}
+
+/// Whether the best of some lengths near another has neighbours among them: then none farther away is tried.
+pub(crate) fn is_inside(best: usize, near: &Range<usize>, count: usize) -> bool {
+    (best > near.start || near.start == 0) && (best + 1 < near.end || near.end == count)
+}
+
 /// The fit with the smallest error, or `None` if none predicts any row.
 pub(crate) fn best(validated: &[Validated]) -> Option<&Validated> {
     validated.iter().filter(|one| one.error.is_finite()).min_by(|a, b| a.error.total_cmp(&b.error))

@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::exec::stages::Stages;
 use crate::inference::bandwidths::{outward, within};
 use crate::inference::constancy::BLOCKS;
-use crate::inference::cross_validation::{ComparedRows, best_length, rule_out};
+use crate::inference::cross_validation::{ComparedRows, best_length, is_inside, near, rule_out};
 use crate::inference::slow_curve::Varying;
 use crate::inference::slow_equations::{Prediction, QUADRATIC, Slow};
 use crate::regression::constants::Expected;
@@ -32,8 +32,6 @@ const STRETCH: usize = BLOCKS;
 const ROUNDS: usize = 3;
 /// A round is the last that chooses the same and changes the error by no more than this part.
 const SETTLED: f64 = 2e-3;
-/// So many lengths of windows on either side of the one that was best a round before are tried first.
-const NEAR: usize = 2;
 
 /// The slow coefficients found.
 #[derive(Clone, Debug)]
@@ -108,14 +106,12 @@ impl SlowSearch<'_> {
         stages: &mut Stages<'_, '_>,
     ) -> Result<Option<(Scale, f64)>, Error> {
         let &Self { noise, expected, scales, instructions, .. } = self;
-        if let Some(place) = before.and_then(|before| scales.iter().position(|one| *one == before)) {
-            let near = place.saturating_sub(NEAR)..(place + NEAR + 1).min(scales.len());
+        let place_of = |scale: Scale| scales.iter().position(|one| *one == scale);
+        if let Some(place) = before.and_then(place_of) {
+            let near = near(place, scales.len());
             let found = best_length(problem, (scales, &scales[near.clone()]), expected, instructions, stages)?;
-            let is_inside = |(best, _): &(Scale, f64)| {
-                let is_end = |end: usize| scales.get(end).is_some_and(|one| one == best);
-                !(near.start > 0 && is_end(near.start) || near.end < scales.len() && is_end(near.end - 1))
-            };
-            if found.as_ref().is_some_and(is_inside) {
+            let best = found.and_then(|(best, _)| place_of(best));
+            if best.is_some_and(|best| is_inside(best, &near, scales.len())) {
                 return Ok(found);
             }
         }

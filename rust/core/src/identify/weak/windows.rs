@@ -6,15 +6,14 @@ use crate::identify::kinds::Kind;
 use crate::identify::weak::decide::BADLY;
 use crate::identify::weak::decided::{Decided, rows_of};
 use crate::identify::weak::session::Session;
-use crate::inference::cross_validation::{OVERLAP, RuledOut, Validated, best, better_known, rule_out, validate};
+use crate::inference::cross_validation::{
+    OVERLAP, RuledOut, Validated, best, better_known, is_inside, near, rule_out, validate,
+};
 use crate::regression::constants::misfits;
 use crate::regression::fit::Fit;
 use crate::regression::subsample::{are_many, few_stretches, holds, places_of, stretches_of_rows, thinned_rows};
 use crate::regression::window_length::Scale;
 use crate::weak_form::weak_rows::WeakRows;
-
-/// So many lengths on either side of the one that was best a step before are tried first.
-const NEAR: usize = 2;
 
 /// Lengths of windows that were compared by how well they predict, and the others.
 struct ComparedLengths {
@@ -126,14 +125,11 @@ impl Session<'_, '_, '_> {
     ) -> Result<Option<ComparedLengths>, Error> {
         let before = self.best_before.and_then(|samples| Scale::nearest(scales, rows_of(samples, weak.stride)));
         let Some(before) = before else { return Ok(None) };
-        let near = before.saturating_sub(NEAR)..(before + NEAR + 1).min(scales.len());
+        let near = near(before, scales.len());
         let compared = self.compare(&weak.rows, decided, &scales[near.clone()])?;
         let best = best(&compared.validated).and_then(|best| best.fit.scale);
         let place = best.and_then(|best| scales.iter().position(|scale| *scale == best));
-        let is_inside = |place: usize| {
-            (place > near.start || near.start == 0) && (place + 1 < near.end || near.end == scales.len())
-        };
-        Ok(place.is_some_and(is_inside).then_some(compared))
+        Ok(place.is_some_and(|place| is_inside(place, &near, scales.len())).then_some(compared))
     }
 
     /// How well windows of some lengths predict rows that were left out. A few rows rule out what they can; the others are compared on all
