@@ -206,9 +206,10 @@ def test_a_repeated_call_finds_and_says_the_same(name: str) -> None:
 def test_a_kind_that_is_given_beside_settings_is_not_decided_again() -> None:
     angle, torque = _of_two_that_change(2)
     settings = tvident.identify(angle, torque, sample_rate=1000).settings
-    assert settings["tested"] == ["damping", "inertia", "offset"]
+    # In which order they are found to change, the noise decides.
+    assert sorted(settings["tested"]) == ["damping", "inertia", "offset"]
     again = tvident.identify(angle, torque, sample_rate=1000, settings=settings, damping="constant")
-    assert again.settings["tested"] == ["inertia", "offset"]
+    assert again.settings["tested"] == [one for one in settings["tested"] if one != "damping"]
     assert again.settings["kinds"]["damping"] == "constant"
 
 

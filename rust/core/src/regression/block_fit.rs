@@ -144,26 +144,6 @@ impl Parts {
     }
 }
 
-/// The lines that windowed unknowns follow in a block for given constants: the value at its centre and the growth per second. `None` where
-/// the block does not determine them.
-pub(crate) fn lines(rows: &Rows, model: &Model, block: &Range<usize>, constants: &[f64]) -> Option<Vec<[f64; 2]>> {
-    let products = Products { rows, model };
-    let (count, first) = (products.columns(), 2 * model.windowed.len());
-    let (moments, times) = products.of(block);
-    if times[0] <= (ROWS_OF_AN_UNKNOWN * first) as f64 {
-        return None;
-    }
-    let entry = |i: usize, j: usize| moments[i.max(j) * count + i.min(j)];
-    let normal: Vec<f64> = (0..first * first).map(|place| entry(place / first, place % first)).collect();
-    let inverse = inverse(&normal, first)?;
-    let rhs = |i: usize| {
-        entry(i, count - 1) - constants.iter().enumerate().map(|(k, value)| entry(i, first + k) * value).sum::<f64>()
-    };
-    let value = |i: usize| (0..first).map(|j| inverse[i * first + j] * rhs(j)).sum::<f64>();
-    let half = products.centre(block).0;
-    Some((0..model.windowed.len()).map(|one| [value(2 * one), value(2 * one + 1) / half]).collect())
-}
-
 /// Over how many blocks, or parts of them, the information on the constant is spread that is spread least.
 fn spread(told: &[Vec<f64>], constants: usize) -> f64 {
     let of = |i: usize| {

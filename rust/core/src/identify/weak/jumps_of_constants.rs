@@ -1,7 +1,8 @@
 //! Jumps of inertia and damping, where these are constant between jumps.
 //!
 //! Blocks of the record tell between which of them the constants jump. Where exactly is found as for windowed coefficients: rows that reach
-//! over the jump are predicted from the constants and lines on both sides, with velocity and acceleration of local polynomials.
+//! over the jump are predicted from lines of the windowed coefficients and constants on both sides. What these change by acts on velocity and acceleration of
+//! local polynomials; their mean acts on the columns of the rows, so that the noise of those derivatives hardly matters.
 
 use std::ops::Range;
 
@@ -10,8 +11,8 @@ use crate::identify::weak::decided::Decided;
 use crate::identify::weak::jumps::signals;
 use crate::identify::weak::session::Session;
 use crate::inference::jumps::constants::Told;
-use crate::inference::jumps::jump::{Jump, JumpSearch, Lines};
-use crate::inference::jumps::placement::JumpPlace;
+use crate::inference::jumps::free_lines::{OfLines, mean_left};
+use crate::inference::jumps::jump::{Jump, JumpSearch};
 use crate::lanes::output::Elements;
 use crate::local_polynomials::criterion::Criterion;
 use crate::local_polynomials::estimates::Estimates;
@@ -19,7 +20,7 @@ use crate::local_polynomials::options::{Order, PolynomialOptions, Selection};
 use crate::local_polynomials::plan::LocalPolynomials;
 use crate::record::derived::Whole;
 use crate::record::samples::Samples;
-use crate::regression::block_fit::{Parts, lines};
+use crate::regression::block_fit::Parts;
 use crate::regression::model::Model;
 use crate::weak_form::test_function_choice::spectrum_length;
 use crate::weak_form::weak_rows::WeakRows;
@@ -28,8 +29,11 @@ use crate::weak_form::weak_rows::WeakRows;
 const CYCLES: f64 = 3.0;
 const TEST_FUNCTIONS: usize = 2;
 const FEWEST_BLOCKS: usize = 8;
-/// Half-widths of the test function around the last place within which the next one is looked for.
+/// Into so many parts the blocks beside a jump are cut to tell about where it is, and each part once more until a test function reaches over it.
+const PARTS: usize = 16;
+/// Half-widths of the test function around that place within which the jump is looked for: at first, and at most where it may as well be at an end of them.
 const NEAR: usize = 2;
+const FAR: usize = 8;
 /// The shortest windows of velocity and acceleration.
 const SHORTEST_WINDOW: usize = 9;
 
@@ -38,7 +42,8 @@ struct BeforeAndAfter {
     constants: [Vec<f64>; 2],
     /// Rows of a block.
     length: usize,
-    sample: usize,
+    /// The row from which on blocks are after it.
+    row: usize,
 }
 
 impl Session<'_, '_, '_> {
@@ -81,11 +86,8 @@ impl Session<'_, '_, '_> {
         let Some(values) = ends.windows(2).map(values).collect::<Option<Vec<_>>>() else { return Ok(Vec::new()) };
         let derivatives = self.derivatives(weak.function.half_width())?;
         let placed = places.iter().zip(values.windows(2)).map(|(&block, values)| {
-            let both = BeforeAndAfter {
-                constants: [values[0].clone(), values[1].clone()],
-                length,
-                sample: weak.first + blocks[block].start * weak.stride,
-            };
+            let both =
+                BeforeAndAfter { constants: [values[0].clone(), values[1].clone()], length, row: blocks[block].start };
             self.placed(weak, decided, model, &derivatives, &both)
         });
         Ok(placed.collect::<Option<Vec<Jump>>>().unwrap_or_default())
@@ -102,20 +104,20 @@ impl Session<'_, '_, '_> {
     ) -> Option<Jump> {
         let [velocity, acceleration] = derivatives.each_ref().map(Vec::as_slice);
         let mut rhs = weak.rows.rhs.clone();
-        let (mut moving, mut factors): (Vec<Box<dyn Samples + '_>>, Vec<usize>) = (Vec::new(), Vec::new());
+        let mut moving: Vec<Box<dyn Samples + '_>> = Vec::new();
+        // Half of what each changes by.
+        let mut changes = Vec::new();
         for (place, &unknown) in model.constant.iter().enumerate() {
-            match unknown {
-                0 => moving.push(Box::new(acceleration)),
-                1 => moving.push(Box::new(velocity)),
-                2 => moving.push(Box::new(Whole(self.record.angle))),
-                _ => {
-                    let value = f64::midpoint(both.constants[0][place], both.constants[1][place]);
-                    let column = &weak.rows.regressors[unknown].value;
-                    rhs.iter_mut().zip(column).for_each(|(rhs, column)| *rhs -= value * column);
-                    continue;
-                }
-            }
-            factors.push(place);
+            let [before, after] = both.constants.each_ref().map(|values| values[place]);
+            let column = &weak.rows.regressors[unknown].value;
+            rhs.iter_mut().zip(column).for_each(|(rhs, column)| *rhs -= f64::midpoint(before, after) * column);
+            moving.push(match unknown {
+                0 => Box::new(acceleration),
+                1 => Box::new(velocity),
+                2 => Box::new(Whole(self.record.angle)),
+                _ => continue,
+            });
+            changes.push((after - before) / 2.0);
         }
         moving.extend(signals(&self.record, model)?);
         let all: Vec<&dyn Samples> = moving.iter().map(|signal| &**signal).collect();
@@ -137,33 +139,26 @@ impl Session<'_, '_, '_> {
         };
         let half = weak.function.half_width();
         let (rows, last) = (weak.rows.len(), weak.first + (weak.rows.len() - 1) * weak.stride);
-        let mut sample = both.sample;
-        let mut jump = None;
-        for wide in [both.length * weak.stride, NEAR * half, NEAR * half] {
-            let row_of = |sample: usize| (sample.saturating_sub(weak.first) / weak.stride).min(rows);
-            let row = row_of(sample).clamp(1, rows - 1);
-            let gap = wide / weak.stride + weak.reach();
-            let before = row.saturating_sub(gap + both.length)..row.saturating_sub(gap);
-            let after = (row + gap).min(rows)..(row + gap + both.length).min(rows);
-            let line = |block: &Range<usize>, place_of: usize, origin: usize| -> Option<Lines> {
-                let centre = 0.5 * (block.start + block.end) as f64 - 0.5;
-                let found = lines(&weak.rows, model, block, &both.constants[place_of])?;
-                let at = |[value, growth]: [f64; 2]| {
-                    let growth = growth * weak.rows.period;
-                    [value + growth * (origin as f64 - centre), growth]
-                };
-                let constants = factors.iter().map(|&place| [both.constants[place_of][place], 0.0]);
-                Some(constants.chain(found.into_iter().map(at)).collect())
-            };
-            let both = [line(&before, 0, row)?, line(&after, 1, row - 1)?];
-            let candidates = sample.saturating_sub(wide).max(weak.first)..(sample + wide + 1).min(last);
+        let row_of = |sample: usize| (sample.saturating_sub(weak.first) / weak.stride).min(rows);
+        // As long as the windows that predict best.
+        let span = decided.fit.as_ref().map_or(both.length, |fit| fit.span);
+        let lines = span.clamp(TEST_FUNCTIONS * weak.reach(), 2 * both.length);
+        let beside = BesideJump { weak, model, both, lines };
+        let changes = [changes.iter().map(|change| -change).collect(), changes];
+        let mut sample = weak.first + beside.about()? * weak.stride;
+        let mut within = NEAR * half;
+        loop {
+            let candidates = sample.saturating_sub(within).max(weak.first)..(sample + within + 1).min(last);
             let over = row_of(candidates.start.saturating_sub(half))..row_of(candidates.end + half);
-            let left = search.left(&JumpPlace { lines: &both, row, over: &over, candidates: &candidates })?;
+            let far = beside.lines_around(&over)?;
+            let (left, count) = search.left_beside_lines(&changes, &far, (&over, &candidates))?;
             let best = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]))?;
-            sample = candidates.start + best;
-            jump = Some(search.jump(&left, best, candidates.start, over.len() as f64));
+            let jump = search.jump(&left, best, candidates.start, count);
+            if jump.is_between_ends() || within >= FAR * half {
+                return Some(Jump { of_constants: true, ..jump });
+            }
+            (sample, within) = (candidates.start + best, 2 * within);
         }
-        jump.map(|jump| Jump { of_constants: true, ..jump })
     }
 
     /// Velocity and acceleration at every sample, from polynomials in windows as long as half a test function.
@@ -192,5 +187,66 @@ impl Session<'_, '_, '_> {
         let workers = self.stages.workers;
         self.stages.stage(|watch| plan.run(&[angle], estimates, true, workers, watch))?;
         Ok(both)
+    }
+}
+
+/// The rows beside a jump of constants.
+struct BesideJump<'a> {
+    weak: &'a WeakRows,
+    model: &'a Model,
+    both: &'a BeforeAndAfter,
+    /// Rows over which windowed unknowns follow a line.
+    lines: usize,
+}
+
+impl BesideJump<'_> {
+    /// What rows beside others say of lines that windowed unknowns follow there, as far as one line may hold.
+    fn lines_around(&self, over: &Range<usize>) -> Option<[OfLines; 2]> {
+        let whole = self.wider(over, self.lines);
+        Some([self.line(whole.start..over.start, 0)?, self.line(over.end..whole.end, 1)?])
+    }
+
+    /// What some rows say of lines beside the constants before or after the jump.
+    fn line(&self, rows: Range<usize>, side: usize) -> Option<OfLines> {
+        OfLines::new(&self.weak.rows, self.model, &rows, &self.both.constants[side])
+    }
+
+    /// The mean square that is left of rows before some and after them, as far as others reach, by lines that hold so long as one may.
+    fn left(&self, over: &Range<usize>, whole: &Range<usize>) -> Option<f64> {
+        let sides = [whole.start..over.start.max(whole.start), over.end.min(whole.end)..whole.end];
+        let mut all = Vec::new();
+        for (side, rows) in sides.into_iter().enumerate() {
+            let count = (rows.len() / self.lines).max(1);
+            for part in 0..count {
+                let place = |part: usize| rows.start + rows.len() * part / count;
+                all.push(self.line(place(part)..place(part + 1), side)?);
+            }
+        }
+        mean_left(&all)
+    }
+
+    /// Rows, and so many more on either side as there are.
+    fn wider(&self, rows: &Range<usize>, more: usize) -> Range<usize> {
+        rows.start.saturating_sub(more)..(rows.end + more).min(self.weak.rows.len())
+    }
+
+    /// The row about which the constants jump: where lines of the windowed unknowns leave least beside them, not counting rows that a test function there
+    /// reaches over.
+    fn about(&self) -> Option<usize> {
+        let (mut row, mut within) = (self.both.row, self.both.length);
+        let whole = self.wider(&(row..row), 2 * within);
+        loop {
+            let step = (within / PARTS).max(1);
+            let left = |place: usize| -> Option<(usize, f64)> {
+                let over = self.wider(&(place..place), self.weak.reach());
+                Some((place, self.left(&over, &whole)?))
+            };
+            let places = self.wider(&(row..row + 1), within).step_by(step);
+            (row, _) = places.filter_map(left).min_by(|a, b| a.1.total_cmp(&b.1))?;
+            if step <= self.weak.reach().max(1) {
+                return Some(row);
+            }
+            within = 2 * step;
+        }
     }
 }

@@ -21,6 +21,14 @@ pub(crate) struct Jump {
     pub(crate) of_constants: bool,
 }
 
+impl Jump {
+    /// Whether neither end of the places that were tried is likely.
+    pub(crate) fn is_between_ends(&self) -> bool {
+        let before_last = self.happened.iter().rev().nth(1).copied().unwrap_or(0.0);
+        self.happened.first().is_some_and(|&first| first < UNLIKELY) && before_last > 1.0 - UNLIKELY
+    }
+}
+
 /// The data in which jumps are searched.
 pub(crate) struct JumpSearch<'a> {
     /// The rows minus the contribution of the constants.
@@ -65,6 +73,15 @@ pub(crate) type Lines = Vec<[f64; 2]>;
 mod tests {
     use super::*;
     use crate::inference::jumps::simulated::{HALF, SAMPLES, searched, spring};
+
+    #[test]
+    fn a_jump_that_may_be_at_an_end_of_its_places_is_not_between_them() {
+        let jump = |happened: &[f64]| Jump { sample: 7, first: 5, happened: happened.to_vec(), of_constants: true };
+        assert!(jump(&[1e-4, 0.3, 0.9999, 1.0]).is_between_ends());
+        assert!(!jump(&[0.01, 0.3, 0.9999, 1.0]).is_between_ends());
+        assert!(!jump(&[1e-4, 0.3, 0.99, 1.0]).is_between_ends());
+        assert!(!jump(&[1.0]).is_between_ends() && !jump(&[]).is_between_ends());
+    }
 
     #[test]
     fn rows_from_a_sample_on_are_those_whose_time_is_not_before_it() {

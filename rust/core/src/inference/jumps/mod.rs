@@ -1,6 +1,7 @@
 //! Jumps of windowed coefficients and of constants.
 
 pub(crate) mod constants;
+pub(crate) mod free_lines;
 pub(crate) mod jump;
 pub(crate) mod placement;
 pub(crate) mod pulses;
