@@ -169,24 +169,31 @@ impl Scan {
         self.unknowns.iter().position(|&one| one == unknown)
     }
 
-    /// Whether widths disagree, or the constant of an unknown is not theirs, beyond so many of their errors.
-    fn is_beside(&self, constants: &[(usize, f64)], errors: f64) -> bool {
-        let Some(one) = self.narrowest().filter(|_| !self.has_no_plateau()) else { return true };
-        let off = |&(unknown, value): &(usize, f64)| {
-            let place = self.place(unknown);
-            place.is_some_and(|place| (one.values[place] - value).abs() > errors * one.errors[place])
-        };
-        self.agreement != Agreement::WithinErrors || constants.iter().any(off)
-    }
-
-    /// Whether constants of some unknowns may contradict the widths: another look is worth it.
+    /// Whether constants of some unknowns may contradict widths that agree, any of them, or widths disagree: another look is worth it.
     pub(crate) fn is_in_doubt(&self, constants: &[(usize, f64)]) -> bool {
-        self.is_beside(constants, IN_DOUBT)
+        let Some(plateau) = self.within_errors() else { return true };
+        let agreed = &self.scales[plateau.first..=plateau.last];
+        agreed.iter().any(|scale| self.is_beside(scale, constants, IN_DOUBT))
     }
 
     /// Whether widths agree, and on these constants.
     pub(crate) fn confirms(&self, constants: &[(usize, f64)]) -> bool {
-        !self.is_beside(constants, OTHER_CONSTANT)
+        let Some(plateau) = self.within_errors() else { return false };
+        !self.is_beside(&self.scales[plateau.first], constants, OTHER_CONSTANT)
+    }
+
+    /// The plateau, if widths agree within their errors.
+    fn within_errors(&self) -> Option<Plateau> {
+        self.accepted_plateau().filter(|_| self.agreement == Agreement::WithinErrors)
+    }
+
+    /// Whether the constant of an unknown is not that of one width, beyond so many of its errors.
+    fn is_beside(&self, scale: &AtScale, constants: &[(usize, f64)], errors: f64) -> bool {
+        let off = |&(unknown, value): &(usize, f64)| {
+            let place = self.place(unknown);
+            place.is_some_and(|place| (scale.values[place] - value).abs() > errors * scale.errors[place])
+        };
+        constants.iter().any(off)
     }
 
     /// Whether a constant is not what the plateau says, by more than chance and a part of it.
@@ -345,6 +352,20 @@ mod tests {
         // Too few widths are no plateau.
         assert!(!scan(1.0, 0.01, 2).contradicts(&scan(0.95, 0.01, 6)));
         assert!(!shorter.contradicts(&scan(0.95, 0.01, 2)));
+    }
+
+    #[test]
+    fn constants_are_in_doubt_that_one_of_the_widths_contradicts() {
+        let mut scan = scan(1.0, 0.1, 8);
+        scan.unknowns = vec![0];
+        scan.scales[4].errors[0] = 0.01;
+        let constants = |value: f64| [(0, value)];
+        assert!(!scan.is_in_doubt(&constants(1.015)) && scan.is_in_doubt(&constants(1.025)));
+        assert!(scan.confirms(&constants(1.3)) && !scan.confirms(&constants(1.5)));
+        // Of another unknown widths say nothing.
+        assert!(!scan.is_in_doubt(&[(1, 9.0)]));
+        scan.agreement = Agreement::Alike;
+        assert!(scan.is_in_doubt(&constants(1.0)) && !scan.confirms(&constants(1.0)));
     }
 
     #[test]

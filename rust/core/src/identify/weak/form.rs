@@ -317,6 +317,7 @@ fn settled(
             highest_noise: filtered.torque_noise[1],
             shared_until: filtered.until,
             scan: Scan::default(),
+            suggested: None,
             free_offset: FreeOffset::default(),
             windowed_offset: None,
             most_slow: None,

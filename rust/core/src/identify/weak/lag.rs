@@ -82,6 +82,7 @@ impl Session<'_, '_, '_> {
                 chosen = self.choose(model)?;
             }
             let mut decided = self.decide(&mut chosen, model)?;
+            (chosen, decided) = self.between_jumps_of_suggested(chosen, decided, model)?;
             if self.options.lag.is_some() || self.varies_too_much(&decided) {
                 return Ok((chosen, decided, None));
             }

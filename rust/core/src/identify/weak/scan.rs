@@ -35,6 +35,7 @@ impl Session<'_, '_, '_> {
         last: Option<&Chosen>,
     ) -> Result<Chosen, Error> {
         let given = self.options.half_width.is_some();
+        self.suggested = None;
         // Without a coefficient of the motion among the unknowns there is nothing that widths could tell apart.
         let moves = self.unknowns().iter().any(|&unknown| unknown < 3);
         if given && !self.options.diagnose || !moves {
@@ -59,6 +60,7 @@ impl Session<'_, '_, '_> {
             chosen = self.without_shortest_windows(chosen, model, last)?;
         }
         let used = chosen.weak.function.half_width();
+        self.suggested = Some(before).filter(|_| used < before);
         self.scan = scans.with(used);
         self.scan.moved = used != before || self.options.width_from == Some(WidthFrom::Plateau);
         Ok(chosen)
@@ -132,16 +134,33 @@ impl Session<'_, '_, '_> {
         Ok(best)
     }
 
+    /// Decides with the wider test function that the spectra suggest where a narrower one, which widths that were compared as if nothing jumped led to,
+    /// finds jumps and other constants than theirs. The wider one stands if, between the jumps that it finds, widths agree with it and with its constants.
+    pub(crate) fn between_jumps_of_suggested(
+        &mut self,
+        chosen: Chosen,
+        decided: Decided,
+        model: &Model,
+    ) -> Result<(Chosen, Decided), Error> {
+        let constants = constants_between_jumps(&decided).filter(|constants| self.scan.is_in_doubt(constants));
+        let Some(suggested) = self.suggested.filter(|_| constants.is_some()) else { return Ok((chosen, decided)) };
+        let mut wider = self.chosen_with(suggested, model)?;
+        let found = self.decide(&mut wider, model)?;
+        let Some(constants) = constants_between_jumps(&found) else { return Ok((chosen, decided)) };
+        let scans = self.scan(model, suggested, &found.jumps)?;
+        let agrees = scans.accepted_beside_windows(suggested).is_none() && scans.best.confirms(&constants);
+        if !agrees {
+            return Ok((chosen, decided));
+        }
+        self.scan = scans.with(suggested);
+        Ok((wider, found))
+    }
+
     /// Compares widths once more where windowed unknowns jump and widths were compared as if they did not: in a block that holds a jump a line follows it,
     /// which moves constants with every width alike. The second comparison stands if it confirms the constants.
     pub(crate) fn scan_between_jumps(&mut self, chosen: &Chosen, decided: &Decided) -> Result<(), Error> {
-        let Some(fit) = decided.fit.as_ref().filter(|_| self.scan.tried > 0) else { return Ok(()) };
-        let beside_constants = decided.jumps.iter().all(|jump| !jump.of_constants);
-        let values = fit.pooled.values.iter().copied();
-        let constants: Vec<(usize, f64)> = decided.model.constant.iter().copied().zip(values).collect();
-        if decided.jumps.is_empty() || !beside_constants || !self.scan.is_in_doubt(&constants) {
-            return Ok(());
-        }
+        let constants = constants_between_jumps(decided).filter(|_| self.scan.tried > 0);
+        let Some(constants) = constants.filter(|constants| self.scan.is_in_doubt(constants)) else { return Ok(()) };
         let used = chosen.weak.function.half_width();
         let again = self.scan(&self.model(), used, &decided.jumps)?.with(used);
         if again.confirms(&constants) {
@@ -199,4 +218,11 @@ impl Session<'_, '_, '_> {
         }
         Ok((weak, places))
     }
+}
+
+/// The constants that were found where windowed unknowns jump and nothing else does.
+fn constants_between_jumps(decided: &Decided) -> Option<Vec<(usize, f64)>> {
+    let values = decided.fit.as_ref()?.pooled.values.iter().copied();
+    let jump = !decided.jumps.is_empty() && decided.jumps.iter().all(|jump| !jump.of_constants);
+    jump.then(|| decided.model.constant.iter().copied().zip(values).collect())
 }

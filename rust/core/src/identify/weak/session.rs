@@ -38,6 +38,8 @@ pub(crate) struct Session<'a, 'b, 'c> {
     pub(crate) shared_until: Option<f64>,
     /// Estimates by the width of the test function.
     pub(crate) scan: Scan,
+    /// The half-width that the spectra suggest, where widths that agree are narrower.
+    pub(crate) suggested: Option<usize>,
     /// How much better an offset would predict that is free in every window, where the record contradicts a constant one.
     pub(crate) free_offset: FreeOffset,
     /// The offset that the record was to decide upon and that is free in every window.
