@@ -10,6 +10,7 @@ use crate::regression::constants::{Expected, pool};
 use crate::regression::fit::Fit;
 use crate::regression::problem::Problem;
 use crate::regression::solved::{Solved, is_determined};
+use crate::regression::subsample::rows_all_over;
 use crate::regression::window_length::Scale;
 use crate::simd::instructions::Instructions;
 use crate::simd::vectors::dispatch;
@@ -193,7 +194,7 @@ pub(crate) struct Prediction {
 impl Slow<'_> {
     /// Mean squared error of predicting rows, over the noise's variance: slow coefficients from equations without the row, windowed ones from windows
     /// on both sides of it. The angle's noise in a row grows with the coefficients: each square counts as if that were the expected noise, or
-    /// the smallest coefficients would predict best. More than twice that noise excuses no error.
+    /// the smallest coefficients would predict best. More than twice that noise excuses no error. Of many rows some are predicted.
     pub(crate) fn error(
         &self,
         problem: &Problem<'_>,
@@ -215,7 +216,7 @@ impl Slow<'_> {
             constants[self.coefficients..].copy_from_slice(&curve.constants);
             constants
         });
-        for row in (0..self.rows).filter(|&row| problem.usable[row]) {
+        for row in rows_all_over(self.rows).filter(|&row| problem.usable[row]) {
             let cell = scale.cell(row);
             let Some(place) = solved.place(cell).filter(|&place| is_determined(solved, place)) else { continue };
             let mut error = problem.rhs[row];

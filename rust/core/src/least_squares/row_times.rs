@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::exec::huge_pages::zeros;
 use crate::record::samples::{Samples, all_usable};
+use crate::record::subsample::GOLDEN;
 use crate::simd::instructions::Instructions;
 use crate::simd::vectors::{Kernel, Lanes, MOST_LANES, dispatch};
 
@@ -11,7 +12,6 @@ const PIECE: usize = 1 << 10;
 
 /// Steps that tell the usual one, spread over the record.
 const LOOKED_AT: usize = 1 << 12;
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Times of rows in seconds, and what all of them show.
 #[derive(Clone, Debug)]
@@ -76,7 +76,6 @@ impl RowTimes {
     pub fn usual_step(&self) -> f64 {
         let all = self.since.len().saturating_sub(1);
         let count = all.min(LOOKED_AT);
-        // In golden sections, which no pattern of the steps falls in with.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of the steps")]
         let section = |step: usize| ((step as f64 * GOLDEN).fract() * all as f64) as usize;
         let places = (0..count).map(|step| if count == all { step } else { section(step) });

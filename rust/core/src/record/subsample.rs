@@ -4,6 +4,9 @@
 
 use std::ops::Range;
 
+/// The golden section: no pattern of samples falls in with its multiples.
+pub(crate) const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
 /// All places, or so many of them in evenly spread stretches.
 pub(crate) fn stretches(places: usize, most: usize, count: usize) -> impl Iterator<Item = Range<usize>> {
     let (count, length) = if places <= most { (1, places) } else { (count, most / count) };

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::equation::rows::BLOCK;
 use crate::equation::rows::{Regressor, Rows};
-use crate::record::subsample::stretches;
+use crate::record::subsample::{GOLDEN, stretches};
 use crate::regression::window_length::Scale;
 
 /// The same for rows, each stretch from the beginning of a block of them.
@@ -67,6 +67,18 @@ pub(crate) fn few_stretches(rows: usize, scales: &[Scale]) -> Option<(Vec<Range<
     (held > 1).then(|| (stretches_of_blocks(rows, few, STRETCHES), held))
 }
 
+/// Rows that compare what may change anywhere in a record: all of them, or one in each of about so many equal parts where there are at least twice as many.
+/// No period of the motion falls in with their places.
+pub(crate) fn rows_all_over(rows: usize) -> impl Iterator<Item = usize> {
+    let part = if rows <= LONG { 1 } else { rows / MOST_ROWS };
+    let of_part = move |index: usize| {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within a part")]
+        let within = ((index as f64 * GOLDEN).fract() * part as f64) as usize;
+        index * part + within
+    };
+    (0..rows / part).map(of_part)
+}
+
 /// Whether rows are so many that those in few stretches are much fewer.
 pub(crate) fn are_many(rows: usize) -> bool {
     rows > 2 * FEW_ROWS
@@ -117,6 +129,29 @@ pub(crate) fn holds(scale: Scale) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn few_rows_compare_all_over_what_many_would() {
+        assert!(rows_all_over(LONG).eq(0..LONG));
+        for rows in [LONG + 1, 700_001] {
+            let found: Vec<usize> = rows_all_over(rows).collect();
+            let part = rows / MOST_ROWS;
+            assert!((MOST_ROWS..MOST_ROWS + MOST_ROWS / part).contains(&found.len()));
+            assert!(found.iter().enumerate().all(|(index, row)| row / part == index));
+            // Whatever period the motion has, each quarter of its phases holds its share, but for a tenth.
+            for period in [part, part + 1, 2 * part, 3 * part + 1, 40].into_iter().filter(|period| *period >= 16) {
+                let phase = |row: &usize| (row % period) as f64 / period as f64;
+                let share = |quarter: f64| {
+                    let met = found.iter().filter(|row| (quarter..quarter + 0.25).contains(&phase(row))).count();
+                    let whole = (0..period).filter(|row| (quarter..quarter + 0.25).contains(&phase(row))).count();
+                    (met * period) as f64 / (whole * found.len()) as f64
+                };
+                for quarter in [0.0, 0.25, 0.5, 0.75] {
+                    assert!((share(quarter) - 1.0).abs() < 0.1, "{rows} {period} {quarter}: {}", share(quarter));
+                }
+            }
+        }
+    }
 
     #[test]
     fn stretches_of_rows_begin_with_a_block() {
