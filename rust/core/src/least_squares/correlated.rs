@@ -298,19 +298,19 @@ impl Sandwich<'_, '_, '_> {
             &of_rows[..count]
         } else {
             let sums = side_by_side::<N>(neighbours, count);
-            sliding_sums(correlated, of_rows, sums);
+            sliding_sums(simd, correlated, of_rows, sums);
             sums
         };
         let neighbours = &neighbours[(from - from_neighbours).unsigned_abs()..];
         let [mut here, mut next] = [here, next].map(|vectors| side_by_side::<P>(vectors, length));
         let pairs = Pairs::<R>(p);
-        begin(&neighbours[..length], pairs, next);
+        begin(simd, &neighbours[..length], pairs, next);
         let scale = ErrorScale::new(fits.plan, fits.rows(), bandwidth);
         let counts = (products.first, &*products.counts);
         let skipped = (first - from).unsigned_abs();
         for (block, after) in neighbours[length..].chunks_exact(length).enumerate() {
             std::mem::swap(&mut here, &mut next);
-            slide(after, pairs, here, next);
+            slide(simd, after, pairs, here, next);
             // Windows by where they begin after the first block.
             let wanted = skipped.max(block * length)..(skipped + rows.len()).min((block + 1) * length);
             if wanted.is_empty() {

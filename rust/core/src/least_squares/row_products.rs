@@ -104,11 +104,40 @@ fn multiply_some<S: Lanes, const N: usize, const WHOLE: bool>(
 #[derive(Clone, Copy)]
 pub(crate) struct Pairs<const R: usize>(pub(crate) usize);
 
+/// Vectors that hold the pairs of a vector's numbers.
+const VECTORS: usize = (MOST_LANES + 1).div_ceil(2);
+
+impl<const R: usize> Pairs<R> {
+    /// Of every vector of pairs, which numbers stand on the left and on the right: the first number where there are no more pairs.
+    const ORDERS: [[[usize; MOST_LANES]; 2]; VECTORS] = {
+        let mut orders = [[[0; MOST_LANES]; 2]; VECTORS];
+        let (mut pair, mut i) = (0, 0);
+        while i < R && R <= MOST_LANES {
+            let mut k = i;
+            while k < R {
+                let order = &mut orders[pair / MOST_LANES];
+                (order[0][pair % MOST_LANES], order[1][pair % MOST_LANES]) = (i, k);
+                (pair, k) = (pair + 1, k + 1);
+            }
+            i += 1;
+        }
+        orders
+    };
+}
+
 impl<const R: usize, const N: usize, const P: usize> Summed<[f64; N], P> for Pairs<R> {
     #[inline(always)]
-    fn of(self, row: &[f64; N]) -> [f64; P] {
+    fn of<S: Lanes>(self, simd: S, row: &[f64; N]) -> [f64; P] {
         let numbers = if R == 0 { self.0 } else { R };
         let (mut products, mut pair) = ([0.0; P], 0);
+        if N == MOST_LANES && N == S::F64_LANES && R > 0 && R < N {
+            // Left to the compiler, both sides are gathered from memory number by number, unless they fill whole rows.
+            let row = simd.load(row, 0);
+            for (products, [left, right]) in products.chunks_exact_mut(N).zip(&Self::ORDERS) {
+                simd.store(products, 0, simd.mul_f64s(simd.permute(row, left), simd.permute(row, right)));
+            }
+            return products;
+        }
         for i in 0..numbers {
             for k in i..numbers {
                 products[pair] = row[i] * row[k];
@@ -138,6 +167,32 @@ mod tests {
         fn run<S: Lanes>(self, simd: S) -> u32 {
             multiply(simd, self.0, &self.1, self.2, self.3)
         }
+    }
+
+    struct OfPairs<const R: usize, const P: usize>([f64; 8]);
+
+    impl<const R: usize, const P: usize> Kernel for OfPairs<R, P> {
+        type Output = [f64; P];
+
+        #[inline(always)]
+        fn run<S: Lanes>(self, simd: S) -> [f64; P] {
+            Pairs::<R>(R).of(simd, &self.0)
+        }
+    }
+
+    #[test]
+    fn each_pair_has_its_product_on_every_path() {
+        fn check<const R: usize, const P: usize>() {
+            let row = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0];
+            let expected: Vec<f64> = (0..R).flat_map(|i| row[i..R].iter().map(move |other| row[i] * other)).collect();
+            for instructions in Instructions::available() {
+                assert_eq!(dispatch(instructions, OfPairs::<R, P>(row))[..expected.len()], expected);
+            }
+        }
+        check::<5, 16>();
+        check::<6, 24>();
+        check::<7, 32>();
+        check::<8, 40>();
     }
 
     #[test]

@@ -30,6 +30,17 @@ pub(crate) trait Lanes: Simd {
         self.load(&values, 0)
     }
 
+    /// The numbers of a vector in another order: of every lane, whose number it takes.
+    #[inline(always)]
+    fn permute(self, numbers: Self::f64s, order: &[usize; MOST_LANES]) -> Self::f64s {
+        let (mut from, mut to) = ([0.0; MOST_LANES], [0.0; MOST_LANES]);
+        self.store(&mut from, 0, numbers);
+        for (to, &lane) in to[..Self::F64_LANES].iter_mut().zip(order) {
+            *to = from[lane % Self::F64_LANES];
+        }
+        self.load(&to, 0)
+    }
+
     /// Writes the low byte of whole numbers below 2^24 to one place and the two bytes above it to another.
     #[inline(always)]
     fn split(self, codes: Self::f64s, low: &mut [u8], high: &mut [u16]) {
@@ -240,6 +251,12 @@ impl Lanes for pulp::x86::V4 {
     }
 
     #[inline(always)]
+    fn permute(self, numbers: Self::f64s, order: &[usize; MOST_LANES]) -> Self::f64s {
+        use pulp::bytemuck::cast;
+        cast(self.avx512f._mm512_permutexvar_pd(cast(*order), cast(numbers)))
+    }
+
+    #[inline(always)]
     fn split(self, codes: Self::f64s, low: &mut [u8], high: &mut [u16]) {
         use pulp::bytemuck::{cast, cast_slice_mut};
         let words = self.avx512f._mm512_cvtpd_epi32(cast(codes));
@@ -279,6 +296,30 @@ mod tests {
     fn every_path_transposes() {
         for instructions in Instructions::available() {
             dispatch(instructions, Transpose);
+        }
+    }
+
+    struct Permute;
+
+    impl Kernel for Permute {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<S: Lanes>(self, simd: S) {
+            let numbers: [f64; MOST_LANES] = std::array::from_fn(|lane| 10.0 + lane as f64);
+            let order = std::array::from_fn(|lane| (5 * lane + 3) % S::F64_LANES);
+            let mut permuted = [0.0; MOST_LANES];
+            simd.store(&mut permuted, 0, simd.permute(simd.load(&numbers, 0), &order));
+            for (number, lane) in permuted[..S::F64_LANES].iter().zip(order) {
+                assert_eq!(*number, 10.0 + lane as f64);
+            }
+        }
+    }
+
+    #[test]
+    fn every_path_permutes() {
+        for instructions in Instructions::available() {
+            dispatch(instructions, Permute);
         }
     }
 
