@@ -323,3 +323,33 @@ def test_every_trial_may_have_its_own_mask() -> None:
         identify(angles, torques, mask=list(mask), **OPTIONS)
     with pytest.raises(TypeError, match="mask must hold True and False; got float64"):
         identify(angles, torques, mask=[1.0 * one for one in masks], **OPTIONS)
+
+
+@pytest.mark.parametrize("seed", [1, 2, *long(3, 4, 5, 6)])
+def test_what_changes_faster_than_windows_is_followed_by_narrower_test_functions(seed: int) -> None:
+    """Test functions were chosen as if nothing changed: intervals held 42 and 48 % of what they should, K was 1.0 and 1.2 % off."""
+    trials = simulated(12, 1500, lambda t: 13 + 3 * np.sin(5 * np.pi * t + seed), seed=seed)
+    found = identify(trials.angle, trials.torque, **OPTIONS)
+    assert found.settings["window_length"][0] < 47
+    assert not found.record_status & tvident.Status.KIND_CONTRADICTED
+    # Seeds 1 to 6: .98 and more, .0061 to .0141.
+    assert np.mean(np.abs(found.stiffness - trials.stiffness) < 1.96 * found.stderr["stiffness"]) > 0.9
+    assert rms(found.stiffness, trials.stiffness) < (0.009 if seed < 3 else 0.015)
+    value, error = found.constants["inertia"]
+    assert abs(value - trials.inertia) < 4 * error
+
+
+@pytest.mark.parametrize("window_length", [17, 65])
+def test_trials_that_share_all_differ_by_their_noise(window_length: int) -> None:
+    """The angles' noise and the growth of what is windowed were differences of trials: 11 to 15 errors of the inertia, 3 of the damping."""
+    rigs = [tvident.simulate_torsional_rig(2.0, seed=10 + seed) for seed in range(8)]
+    noise = np.random.default_rng(10)
+    angle, torque = (np.stack([getattr(rig, name) for rig in rigs]) for name in ("true_angle", "true_torque"))
+    angle += 1e-4 * angle.std() * noise.standard_normal(angle.shape)
+    torque += 3e-3 * torque.std() * noise.standard_normal(torque.shape)
+    found = identify(angle, torque, method=tvident.WeakForm(window_length=window_length), **OPTIONS)
+    assert not found.record_status & tvident.Status.KIND_CONTRADICTED
+    for name in ("inertia", "damping", "stiffness"):
+        values, errors = found.trial_spread[name]
+        # From .83 to .99; eight χ² exceed 1.8² with a probability of 2e-5.
+        assert np.sqrt(np.mean((values / errors) ** 2)) < 1.8

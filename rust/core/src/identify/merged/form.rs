@@ -77,6 +77,7 @@ fn identify_within(
         let Some(again) = session.settle(&model)? else { return session.nothing() };
         fitted = again;
     }
+    let fitted = session.follow(fitted)?;
     let (mut found, at_rows) = session.report(&fitted)?;
     let windowed = fitted.model.windowed.clone();
     drop(fitted);

@@ -16,6 +16,7 @@ use crate::inference::constancy::{self, NoiseFrom, Test};
 use crate::inference::identifiability::is_mostly_noise;
 use crate::inference::missing_terms::Missing;
 use crate::inference::window_averaging::{Averages, average};
+use crate::noise::median::median;
 use crate::regression::constants::{Expected, weakest};
 use crate::regression::fit::Fit;
 use crate::regression::limits::{HARDLY_TOLD_APART, NOISE_MODEL_FAILS};
@@ -63,7 +64,7 @@ impl MergedSession<'_, '_, '_> {
         let mostly_noise = is_mostly_noise(&problem, rows, model, fit, &weakest, 1.0, &mut self.stages)?;
         let averages = self.averages(fitted, &correlated, noise.expected)?;
         let AtRows { mut status, errors, covariances, pairs } = self.at_rows(fitted, &averages, &covariance, inflation);
-        let spread = self.spread(fitted, &averages.values, &noise);
+        let spread = self.spread(fitted, &averages, &noise);
         let count = model.constant.len();
         let kind = |place: usize| if place < model.windowed.len() { Kind::Windowed } else { Kind::Constant };
         let elements = model.windowed.iter().chain(&model.constant).enumerate().zip(spread);
@@ -204,7 +205,9 @@ impl MergedSession<'_, '_, '_> {
             }
         }
         let count = constant.len();
-        let bias = self.squared_bias(fitted, averages);
+        let shared = self.shared_errors(fitted, averages, &self.left_beside(fitted, averages));
+        let bias: Vec<f64> =
+            self.squared_bias(fitted, averages).into_iter().zip(shared).map(|(one, other)| one.max(other)).collect();
         let joint = |one: usize, other: usize, row: usize| {
             let place = fit.nearest(row);
             let later = (row as f64 - fit.centre(place)) * rows.period;
@@ -251,14 +254,13 @@ impl MergedSession<'_, '_, '_> {
                 return 0.0;
             }
             let (value, errors) = (&rows.regressors[windowed[place]].value, &averages.errors[place]);
-            let used = (0..rows.len()).filter(|&row| rows.usable[row] && errors[row].is_finite());
-            let sums = used.fold([0.0; 3], |[count, squares, own], row| {
-                [count + 1.0, squares + value[row] * value[row], own + errors[row] * errors[row]]
-            });
-            let [count, squares, own] = sums;
+            let used = || (0..rows.len()).filter(|&row| rows.usable[row] && errors[row].is_finite());
+            let (count, squares) =
+                used().fold((0.0, 0.0), |(count, squares), row| (count + 1.0, squares + value[row].powi(2)));
+            // Few rows at the ends, where windows lie on one side, have errors many times as large as all others.
+            let own = median(&mut used().map(|row| errors[row].powi(2)).collect::<Vec<f64>>()).unwrap_or(0.0);
             // Several share what is left.
-            (excess / windowed.len() as f64 * count / squares.max(f64::MIN_POSITIVE) - own / f64::max(count, 1.0))
-                .max(0.0)
+            (excess / windowed.len() as f64 * count / squares.max(f64::MIN_POSITIVE) - own).max(0.0)
         };
         (0..windowed.len()).map(of).collect()
     }

@@ -1,0 +1,54 @@
+//! Narrower test functions, where windows hardly longer than one follow too slowly what all trials share.
+//!
+//! The test function is chosen as if nothing changed: for the spectrum of the angles and the noise. A window holds a test function on either side of what it
+//! predicts, so none follows what changes faster. What it leaves then is the same change in all trials, which noise is not.
+
+use std::f64::consts::SQRT_2;
+
+use crate::error::Error;
+use crate::identify::merged::decided::MergedFit;
+use crate::identify::merged::session::MergedSession;
+use crate::regression::residuals::residuals;
+use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
+
+/// Mean squared error of predicting a row, over the noise's, up to which the shortest windows follow.
+const FOLLOWS: f64 = 1.1;
+/// A narrower test function is taken only if rows are predicted so much better.
+const BETTER: f64 = 0.95;
+/// What is left along a windowed element, over what is left across it, from which on all trials have it in common.
+const IN_COMMON: f64 = 2.0;
+
+impl MergedSession<'_, '_, '_> {
+    /// The same decisions with a test function that is narrow enough to follow what changes, as long as each predicts much better than the last.
+    pub(crate) fn follow(&mut self, mut fitted: MergedFit) -> Result<MergedFit, Error> {
+        if self.options.window_length.is_some() || self.options.regression_window.is_some() {
+            return Ok(fitted);
+        }
+        while fitted.has_shortest_windows() && fitted.error > FOLLOWS {
+            let rows = &self.all.rows;
+            let problem = fitted.model.problem(rows, &rows.rhs, 1.0, None);
+            let (left, _) = residuals(&problem, &fitted.fit, &mut self.stages)?;
+            if self.left_in_common(&fitted, &left) < IN_COMMON {
+                break;
+            }
+            let function = self.all.function;
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a half-width is positive")]
+            let half_width = (function.half_width() as f64 / SQRT_2).round() as usize;
+            if half_width < LEAST_HALF_WIDTH {
+                break;
+            }
+            let before = (self.parameters.clone(), self.misfits.clone(), std::mem::take(&mut self.jumps), self.at_end);
+            self.build(TestFunction::new(half_width, function.exponent(), self.options.delta)?)?;
+            self.pilot()?;
+            let again = self.settle(&self.model())?.filter(|again| again.error < BETTER * fitted.error);
+            let Some(again) = again else {
+                self.build(function)?;
+                (self.parameters, self.misfits, self.jumps, self.at_end) = before;
+                self.fill();
+                break;
+            };
+            (fitted, self.at_end) = (again, half_width == LEAST_HALF_WIDTH);
+        }
+        Ok(fitted)
+    }
+}
