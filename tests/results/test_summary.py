@@ -231,3 +231,17 @@ def test_a_model_that_predicts_worse_than_a_constant_explains_nothing() -> None:
     assert result.summary().startswith("do not trust: the model explains nothing of the torque; see what to do")
     assert "explains nothing of the angle simulated and 61 % predicted" in HeldBack(-16.0, 61.0).words()
     assert "explains 0 % of the angle simulated" in HeldBack(0.0, 61.0).words()
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_what_a_mask_leaves_out_is_not_explained_badly(seed: int) -> None:
+    """A stiffness carried 23 s on through what was left out predicted its torque badly: "the model explains nothing of the torque"."""
+    rig = tvident.simulate_torsional_rig(60.0, sample_rate=500, seed=seed, angle_noise=1e-3)
+    torque = rig.torque + 0.06 * rig.torque.std() * np.sign(rig.true_velocity)
+    mask = np.ones(torque.size, np.bool_)
+    mask[15 * 500 : 38 * 500] = False
+    for step in (1, 7):
+        found = tvident.identify(rig.angle, torque, sample_rate=500, mask=mask, step=step)
+        first = found.summary().splitlines()[0]
+        assert first == "do not trust: another equation explains more, and finds another damping; see what to do"
+        assert "coulomb" in found.advice[0]

@@ -13,7 +13,7 @@ from tvident import _report
 from tvident._equation import COEFFICIENTS
 from tvident._results.recorded import Recorded
 from tvident._results.summary import summary_of
-from tvident._results.verdict import share_of
+from tvident._results.verdict import share_of, without_carried
 from tvident._units import in_words_of
 
 Row: TypeAlias = tuple[str, str]
@@ -73,7 +73,7 @@ def _shown(
         angle, torque = _report.names_of_channels(result.units)
         _, *torques = prediction.result()
         compared = [_report.Compared(torque, *torques)]
-        share = share_of(*torques)
+        share = share_of(torques[0], without_carried(result, torques[1]))
         shown = [
             _report.series_of(result, name, of, values)
             for name, of, values in ((angle, "angle", recorded.given[0]), (torque, "torque", recorded.given[1]))

@@ -43,6 +43,9 @@ _DOUBTS = (
 )
 """Flags of a record with which errors hold only if the model does."""
 
+_CARRIED = Status.GAP | Status.ILL_CONDITIONED
+"""Flags of a sample in a gap that is farther from any equation than a window tells."""
+
 _RECORDS = 100
 """Of a batch that are looked at."""
 
@@ -114,7 +117,16 @@ def explained(result: Any) -> float | None:
         _, recorded, predicted = result.predicted_torque()
     except ValueError:
         return None
-    return share_of(recorded, predicted)
+    return share_of(recorded, without_carried(result, predicted))
+
+
+def without_carried(result: Any, predicted: Any) -> Any:
+    """Return a prediction without samples in a gap, as of a mask, into which values are carried from beside it: nobody knows them there."""
+    carried = result.status & _CARRIED == _CARRIED
+    if not carried.any():
+        return predicted
+    places = np.minimum(np.arange(predicted.size) // result.settings["step"], carried.size - 1)
+    return np.where(carried[places], np.nan, predicted)
 
 
 def _is_rest_noise(result: Any) -> bool:
