@@ -67,7 +67,7 @@ pub(crate) fn few_stretches(rows: usize, scales: &[Scale]) -> Option<(Vec<Range<
     (held > 1).then(|| (stretches_of_blocks(rows, few, STRETCHES), held))
 }
 
-/// Rows that compare what may change anywhere in a record: all of them, or one in each of about so many equal parts where there are at least twice as many.
+/// Rows that compare what may change anywhere in a record: all of few, or one in each of at least [`MOST_ROWS`] equal parts of many.
 /// No period of the motion falls in with their places.
 pub(crate) fn rows_all_over(rows: usize) -> impl Iterator<Item = usize> {
     let part = if rows <= LONG { 1 } else { rows / MOST_ROWS };

@@ -38,16 +38,18 @@ impl MergedSession<'_, '_, '_> {
                 break;
             }
             let before = (self.parameters.clone(), self.misfits.clone(), std::mem::take(&mut self.jumps), self.at_end);
+            let decided = (self.scan.clone(), self.freed.clone(), self.is_decided);
             self.build(TestFunction::new(half_width, function.exponent(), self.options.delta)?)?;
             self.pilot()?;
             let again = self.settle(&self.model())?.filter(|again| again.error < BETTER * fitted.error);
             let Some(again) = again else {
                 self.build(function)?;
                 (self.parameters, self.misfits, self.jumps, self.at_end) = before;
+                (self.scan, self.freed, self.is_decided) = decided;
                 self.fill();
                 break;
             };
-            (fitted, self.at_end) = (again, half_width == LEAST_HALF_WIDTH);
+            (fitted, self.at_end) = (again, self.all.function.half_width() == LEAST_HALF_WIDTH);
         }
         Ok(fitted)
     }

@@ -141,24 +141,27 @@ impl Session<'_, '_, '_> {
         let (rows, last) = (weak.rows.len(), weak.first + (weak.rows.len() - 1) * weak.stride);
         let row_of = |sample: usize| (sample.saturating_sub(weak.first) / weak.stride).min(rows);
         // As long as the windows that predict best.
-        let span = decided.fit.as_ref().map_or(both.length, |fit| fit.span);
-        let lines = span.clamp(TEST_FUNCTIONS * weak.reach(), 2 * both.length);
+        let span = decided.fit.as_ref().map_or(both.length, |fit| fit.span).min(2 * both.length);
+        let lines = span.max(TEST_FUNCTIONS * weak.reach()).max(OfLines::enough_rows(model));
         let beside = BesideJump { weak, model, both, lines };
         let changes = [changes.iter().map(|change| -change).collect(), changes];
-        let mut sample = weak.first + beside.about()? * weak.stride;
-        let mut within = NEAR * half;
-        loop {
+        let place = |sample: usize, within: usize| {
             let candidates = sample.saturating_sub(within).max(weak.first)..(sample + within + 1).min(last);
             let over = row_of(candidates.start.saturating_sub(half))..row_of(candidates.end + half);
             let far = beside.lines_around(&over)?;
             let (left, count) = search.left_beside_lines(&changes, &far, (&over, &candidates))?;
             let best = (0..left.len()).min_by(|&a, &b| left[a].total_cmp(&left[b]))?;
-            let jump = search.jump(&left, best, candidates.start, count);
-            if jump.is_between_ends() || within >= FAR * half {
-                return Some(Jump { of_constants: true, ..jump });
-            }
-            (sample, within) = (candidates.start + best, 2 * within);
+            Some(Jump { of_constants: true, ..search.jump(&left, best, candidates.start, count) })
+        };
+        let mut within = NEAR * half;
+        let mut jump = place(weak.first + beside.about()? * weak.stride, within)?;
+        while !jump.is_between_ends() && within < FAR * half {
+            within *= 2;
+            // A gap, or an end of the record, may leave too little beside more samples.
+            let Some(wider) = place(jump.sample, within) else { break };
+            jump = wider;
         }
+        Some(jump)
     }
 
     /// Velocity and acceleration at every sample, from polynomials in windows as long as half a test function.
@@ -217,9 +220,12 @@ impl BesideJump<'_> {
         let mut all = Vec::new();
         for (side, rows) in sides.into_iter().enumerate() {
             let count = (rows.len() / self.lines).max(1);
-            for part in 0..count {
-                let place = |part: usize| rows.start + rows.len() * part / count;
-                all.push(self.line(place(part)..place(part + 1), side)?);
+            let place = |part: usize| rows.start + rows.len() * part / count;
+            let before = all.len();
+            // A part that lies in a gap says nothing.
+            all.extend((0..count).filter_map(|part| self.line(place(part)..place(part + 1), side)));
+            if all.len() == before {
+                return None;
             }
         }
         mean_left(&all)

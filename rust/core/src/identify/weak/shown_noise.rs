@@ -66,7 +66,7 @@ impl Session<'_, '_, '_> {
             return Ok(chosen);
         }
         for _ in 0..ROUNDS {
-            let before = (self.noise, self.scan.clone());
+            let before = (self.noise, self.scan.clone(), self.suggested);
             self.best_before = chosen.best_windows();
             let mut again = self.choose_once(model, &mut scans, Some(&chosen))?;
             self.best_before = None;
@@ -75,7 +75,7 @@ impl Session<'_, '_, '_> {
             }
             self.show_noise(&mut again, model)?;
             if self.is_no_noise(&mut again, model)? {
-                (self.noise, self.scan) = before;
+                (self.noise, self.scan, self.suggested) = before;
                 break;
             }
             chosen = again;

@@ -26,6 +26,11 @@ pub(crate) struct OfLines {
 }
 
 impl OfLines {
+    /// Rows that determine lines, a part of them missing.
+    pub(crate) fn enough_rows(model: &Model) -> usize {
+        2 * ROWS_OF_AN_UNKNOWN * 2 * model.windowed.len()
+    }
+
     /// `None` where rows are too few.
     pub(crate) fn new(rows: &Rows, model: &Model, block: &Range<usize>, constants: &[f64]) -> Option<Self> {
         let products = Products { rows, model };
