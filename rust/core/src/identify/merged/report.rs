@@ -51,10 +51,8 @@ impl MergedSession<'_, '_, '_> {
             NoiseFrom::Equations => model.correlated(rows, &noise.covariance, &mut self.stages)?,
         };
         let problem = model.problem(rows, &rows.rhs, 1.0, Some(&correlated));
-        let mut covariance = fit.covariance(&problem, &noise.covariance, &mut self.stages)?;
-        for entry in &mut covariance {
-            *entry *= inflation;
-        }
+        let covariance = fit.covariance(&problem, &noise.covariance, &mut self.stages)?;
+        let mut covariance: Vec<f64> = covariance.into_iter().map(|entry| inflation * entry).collect();
         // What the noise of the channels does not explain may be correlated in any way.
         if model.windowed.is_empty() && fitted.error > NOISE_MODEL_FAILS {
             let of_blocks = self.in_blocks(model, &[1.0]).pop().flatten();
@@ -63,8 +61,10 @@ impl MergedSession<'_, '_, '_> {
         let weakest = weakest(&fit.full, &fit.pooled.weights);
         let mostly_noise = is_mostly_noise(&problem, rows, model, fit, &weakest, 1.0, &mut self.stages)?;
         let averages = self.averages(fitted, &correlated, noise.expected)?;
-        let AtRows { mut status, errors, covariances, pairs } = self.at_rows(fitted, &averages, &covariance, inflation);
-        let spread = self.spread(fitted, &averages, &noise);
+        let shared = self.left_shared(fitted, &averages);
+        let AtRows { mut status, errors, covariances, pairs } =
+            self.at_rows(fitted, &averages, &shared.errors, &covariance, inflation);
+        let spread = self.spread(fitted, &averages, &shared, &noise);
         let count = model.constant.len();
         let kind = |place: usize| if place < model.windowed.len() { Kind::Windowed } else { Kind::Constant };
         let elements = model.windowed.iter().chain(&model.constant).enumerate().zip(spread);
@@ -180,8 +180,15 @@ impl MergedSession<'_, '_, '_> {
         }
     }
 
-    /// Flags and standard errors of windowed elements, by row.
-    fn at_rows(&self, fitted: &MergedFit, averages: &Averages, covariance: &[f64], inflation: f64) -> AtRows {
+    /// Flags and standard errors of windowed elements, by row, which share some squared errors in all trials.
+    fn at_rows(
+        &self,
+        fitted: &MergedFit,
+        averages: &Averages,
+        shared: &[f64],
+        covariance: &[f64],
+        inflation: f64,
+    ) -> AtRows {
         let Model { windowed, constant, .. } = &fitted.model;
         let (fit, rows, group) = (&fitted.fit, &self.all.rows, self.all.group);
         let condition = fit.full.field(fit.full.fields.condition());
@@ -205,9 +212,8 @@ impl MergedSession<'_, '_, '_> {
             }
         }
         let count = constant.len();
-        let shared = self.shared_errors(fitted, averages, &self.left_beside(fitted, averages));
         let bias: Vec<f64> =
-            self.squared_bias(fitted, averages).into_iter().zip(shared).map(|(one, other)| one.max(other)).collect();
+            self.squared_bias(fitted, averages).into_iter().zip(shared).map(|(one, other)| one.max(*other)).collect();
         let joint = |one: usize, other: usize, row: usize| {
             let place = fit.nearest(row);
             let later = (row as f64 - fit.centre(place)) * rows.period;

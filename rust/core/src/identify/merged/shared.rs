@@ -7,6 +7,7 @@ use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::MergedSession;
 use crate::inference::window_averaging::Averages;
 use crate::noise::median::median;
+use crate::regression::block_products::dot;
 use crate::regression::predictor::without_constants;
 
 /// Standard deviations beyond which more is left along than chance leaves.
@@ -16,6 +17,12 @@ const NO_CHANCE: f64 = 3.3;
 pub(crate) struct NoiseInProducts {
     pub(crate) columns: Vec<Vec<f64>>,
     pub(crate) torque: Vec<f64>,
+}
+
+/// What is left of every row beside the constants and the windowed elements, and the squared errors that these have in all trials.
+pub(crate) struct LeftShared {
+    pub(crate) left: Vec<f64>,
+    pub(crate) errors: Vec<f64>,
 }
 
 /// Means over times and equations of squares that are left.
@@ -40,8 +47,13 @@ impl MergedSession<'_, '_, '_> {
         }
     }
 
+    pub(crate) fn left_shared(&self, fitted: &MergedFit, averages: &Averages) -> LeftShared {
+        let left = self.left_beside(fitted, averages);
+        LeftShared { errors: self.shared_errors(fitted, averages, &left), left }
+    }
+
     /// What is left of every row beside the constants and the windowed elements; not a number where these are not known.
-    pub(crate) fn left_beside(&self, fitted: &MergedFit, averages: &Averages) -> Vec<f64> {
+    fn left_beside(&self, fitted: &MergedFit, averages: &Averages) -> Vec<f64> {
         let (model, rows) = (&fitted.model, &self.all.rows);
         let problem = model.problem(rows, &rows.rhs, 1.0, None);
         let mut left = without_constants(&problem, &fitted.fit.pooled.values);
@@ -55,7 +67,7 @@ impl MergedSession<'_, '_, '_> {
     }
 
     /// The mean squared error that windowed elements have in all trials, beyond that of noise, as what is left shows it; zero where it may be chance.
-    pub(crate) fn shared_errors(&self, fitted: &MergedFit, averages: &Averages, left: &[f64]) -> Vec<f64> {
+    fn shared_errors(&self, fitted: &MergedFit, averages: &Averages, left: &[f64]) -> Vec<f64> {
         let of = |(&element, errors): (&usize, &Vec<f64>)| {
             let Some(LeftAlong { along, across, column, times }) = self.left_along(element, left) else { return 0.0 };
             // What is followed of the noise is along, too, and that much less is left of it there.
@@ -99,9 +111,4 @@ impl MergedSession<'_, '_, '_> {
         let found = LeftAlong { along: along / times, across: across / others, column: column / times, times };
         Some(found).filter(|found| found.across > 0.0)
     }
-}
-
-/// The sum of products.
-pub(crate) fn dot(one: &[f64], other: &[f64]) -> f64 {
-    one.iter().zip(other).map(|(a, b)| a * b).sum()
 }

@@ -9,9 +9,10 @@ use faer::linalg::solvers::{DenseSolveCore, Llt};
 
 use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::MergedSession;
-use crate::identify::merged::shared::{NoiseInProducts, dot};
+use crate::identify::merged::shared::{LeftShared, NoiseInProducts};
 use crate::identify::merged::shown::NoiseOfRows;
 use crate::inference::window_averaging::Averages;
+use crate::regression::block_products::dot;
 use crate::regression::row_covariance::RowCovariance;
 
 /// Rows of a trial that an element takes at least.
@@ -20,7 +21,13 @@ const ROWS_OF_AN_ELEMENT: usize = 4;
 impl MergedSession<'_, '_, '_> {
     /// By how much every element of each trial differs from that of all trials, with its standard error: by the element, constants last, then
     /// by trial. Not numbers where a trial does not tell.
-    pub(crate) fn spread(&self, fitted: &MergedFit, averages: &Averages, noise: &NoiseOfRows) -> Vec<Vec<(f64, f64)>> {
+    pub(crate) fn spread(
+        &self,
+        fitted: &MergedFit,
+        averages: &Averages,
+        shared: &LeftShared,
+        noise: &NoiseOfRows,
+    ) -> Vec<Vec<(f64, f64)>> {
         let (trials, equations, group) = (self.merged.trials.len(), self.merged.equations(), self.all.group);
         let (model, tracks) = (&fitted.model, &averages.values);
         let elements: Vec<usize> = model.windowed.iter().chain(&model.constant).copied().collect();
@@ -30,8 +37,6 @@ impl MergedSession<'_, '_, '_> {
         }
         let rows = &self.all.rows;
         let constants = &fitted.fit.pooled.values;
-        let left = self.left_beside(fitted, averages);
-        let shared = self.shared_errors(fitted, averages, &left);
         let NoiseInProducts { columns: in_columns, torque: in_torque } = self.noise_in_products(&elements);
         for trial in 0..trials {
             let mine = |row: &usize| row % group / equations == trial && rows.usable[*row];
@@ -59,7 +64,8 @@ impl MergedSession<'_, '_, '_> {
                 None => constants[place - tracks.len()],
             };
             let means: Vec<f64> = (0..size).map(mean).collect();
-            let moments: Vec<f64> = (0..size).map(|i| rows.iter().map(|&row| at(i, row) * left[row]).sum()).collect();
+            let moments: Vec<f64> =
+                (0..size).map(|i| rows.iter().map(|&row| at(i, row) * shared.left[row]).sum()).collect();
             let of_noise: Vec<f64> =
                 (0..size).map(|i| count * (in_torque[i] - dot(&in_columns[i], &means)) / scale[i]).collect();
             for (place, spread) in spread.iter_mut().enumerate() {
@@ -72,7 +78,7 @@ impl MergedSession<'_, '_, '_> {
                     moved[row] = (0..size).map(|i| inverse[(place, i)] * at(i, row)).sum();
                 }
                 let mut variance = noise.inflation * quadratic(&moved, &noise.covariance);
-                for (&one, square) in model.windowed.iter().zip(&shared).filter(|(_, square)| **square > 0.0) {
+                for (&one, square) in model.windowed.iter().zip(&shared.errors).filter(|(_, square)| **square > 0.0) {
                     let moved: Vec<f64> = moved.iter().zip(column(one)).map(|(moved, value)| moved * value).collect();
                     variance += square * over_windows(&moved, fitted.fit.span);
                 }

@@ -109,8 +109,9 @@ impl Session<'_, '_, '_> {
         let mut changes = Vec::new();
         for (place, &unknown) in model.constant.iter().enumerate() {
             let [before, after] = both.constants.each_ref().map(|values| values[place]);
+            let mean = f64::midpoint(before, after);
             let column = &weak.rows.regressors[unknown].value;
-            rhs.iter_mut().zip(column).for_each(|(rhs, column)| *rhs -= f64::midpoint(before, after) * column);
+            rhs.iter_mut().zip(column).for_each(|(rhs, column)| *rhs -= mean * column);
             moving.push(match unknown {
                 0 => Box::new(acceleration),
                 1 => Box::new(velocity),

@@ -149,7 +149,7 @@ impl Told<'_> {
 }
 
 /// The solution of normal equations, and what it explains of the sum of squares.
-fn explained(normal: &[f64], rhs: &[f64]) -> Option<(Vec<f64>, f64)> {
+pub(crate) fn explained(normal: &[f64], rhs: &[f64]) -> Option<(Vec<f64>, f64)> {
     let count = rhs.len();
     let inverse = inverse(normal, count)?;
     let values: Vec<f64> = (0..count)

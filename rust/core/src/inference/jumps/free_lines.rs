@@ -6,9 +6,10 @@
 use std::ops::Range;
 
 use crate::equation::rows::Rows;
+use crate::inference::jumps::constants::explained;
 use crate::inference::jumps::jump::{JumpSearch, Lines};
 use crate::inference::jumps::placement::JumpPlace;
-use crate::regression::block_products::{Products, ROWS_OF_AN_UNKNOWN, dot, inverse};
+use crate::regression::block_products::{Products, ROWS_OF_AN_UNKNOWN};
 use crate::regression::model::Model;
 
 /// What some rows say of the lines that windowed coefficients follow, beside given constants: the value at the middle and the growth over half of the rows,
@@ -75,9 +76,7 @@ pub(crate) fn mean_left(blocks: &[OfLines]) -> Option<f64> {
 
 /// What the solution of normal equations leaves of a sum of squares.
 fn left(normal: &[f64], rhs: &[f64], square: f64) -> Option<f64> {
-    let inverse = inverse(normal, rhs.len())?;
-    let explained: f64 = inverse.chunks_exact(rhs.len()).zip(rhs).map(|(row, one)| dot(row, rhs) * one).sum();
-    Some(square - explained)
+    explained(normal, rhs).map(|(_, explained)| square - explained)
 }
 
 impl JumpSearch<'_> {

@@ -24,7 +24,7 @@ pub(crate) struct Jump {
 impl Jump {
     /// Whether neither end of the places that were tried is likely.
     pub(crate) fn is_between_ends(&self) -> bool {
-        let before_last = self.happened.iter().rev().nth(1).copied().unwrap_or(0.0);
+        let before_last = self.happened.iter().nth_back(1).copied().unwrap_or(0.0);
         self.happened.first().is_some_and(|&first| first < UNLIKELY) && before_last > 1.0 - UNLIKELY
     }
 }
