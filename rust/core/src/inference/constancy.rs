@@ -23,12 +23,10 @@ use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
 use crate::inference::drive::{Drive, drive, longest_run};
+use crate::inference::part_constants::{Estimate, NoiseFrom, TestNoise, estimate};
 use crate::noise::median::{MEDIAN_OF_SQUARES, median};
-use crate::regression::constants::{Expected, pool};
 use crate::regression::fit::Fit;
 use crate::regression::problem::Problem;
-use crate::regression::row_covariance::RowCovariance;
-use crate::regression::solved::is_determined;
 use crate::simd::instructions::Instructions;
 
 /// Blocks that a record is cut into.
@@ -64,18 +62,6 @@ pub struct Test {
     squares: f64,
     freedom: usize,
 }
-
-/// Where the variance of the noise is known from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum NoiseFrom {
-    /// The highest frequencies of the channels.
-    Channels,
-    /// What the equations leave, or the step that a channel was rounded to: it need not be white.
-    Equations,
-}
-
-/// The constants of some rows, and their variances; `None` if the rows do not determine them.
-type Estimate = Option<(Vec<f64>, Vec<f64>)>;
 
 /// What a constant gains from the middle of the record to its end, where it may follow a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -145,41 +131,18 @@ impl Test {
     }
 }
 
-/// The noise that a test compares with.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct TestNoise<'a> {
-    pub(crate) expected: Expected,
-    pub(crate) covariance: &'a RowCovariance,
-    /// What variances are multiplied by.
-    pub(crate) inflation: f64,
-    pub(crate) from: NoiseFrom,
-    /// Equations whose rows take turns.
-    pub(crate) equations: usize,
-}
-
 /// Tests every constant of a fit; the result is `None` if the blocks do not determine it.
 pub(crate) fn test(
     problem: &Problem<'_>,
     fit: &Fit,
-    TestNoise { expected, covariance, inflation, from, equations }: TestNoise<'_>,
+    noise: TestNoise<'_>,
     instructions: Instructions,
     stages: &mut Stages<'_, '_>,
 ) -> Result<Vec<Option<Test>>, Error> {
+    let TestNoise { expected, inflation, from, equations, .. } = noise;
     let rows = problem.rows();
     let constants = problem.layout.constant;
-    let (step, span) = (fit.step, fit.span);
-    let estimate = |block: Range<usize>, (): &mut ()| {
-        let windows = within(fit, block.clone(), step, span);
-        let (values, variances) = if windows.is_empty() {
-            alone(problem, block, expected, covariance, instructions)?
-        } else {
-            let pooled = pool(&fit.full, windows.clone(), expected, instructions)?;
-            let variances = fit.covariance_of(problem, windows, &pooled, covariance);
-            (pooled.values, variances)
-        };
-        let variances: Vec<f64> = (0..constants).map(|i| inflation * variances[i * constants + i]).collect();
-        Some((values, variances))
-    };
+    let estimate = |block: Range<usize>, (): &mut ()| estimate(problem, fit, noise, block, instructions);
     let piece = |rows: Range<usize>| Piece { size: rows.len(), content: rows };
     let at = |index: usize| index * rows / (BLOCKS * PARTS);
     let part = |index: usize| at(index)..at(index + 1);
@@ -213,36 +176,6 @@ pub(crate) fn test(
         }
     }
     Ok(tests)
-}
-
-/// The constants of some rows as if there were no others, and their covariance: in windows as long as they are, or in the longest that jumps
-/// leave of them.
-fn alone(
-    problem: &Problem<'_>,
-    rows: Range<usize>,
-    expected: Expected,
-    covariance: &RowCovariance,
-    instructions: Instructions,
-) -> Option<(Vec<f64>, Vec<f64>)> {
-    let jumps = problem.jumps_of(&rows);
-    let part = problem.part(&rows, &jumps);
-    let shortened = [1, 2, 4].map(|part| rows.len() / part);
-    let enough = shortened.into_iter().filter(|&length| length > problem.layout.regressors());
-    let mut fits = enough.filter_map(|length| Fit::in_rows(&part, length, expected, instructions));
-    let fit = fits.find(|fit| (0..fit.full.len()).any(|window| is_determined(&fit.full, window)))?;
-    let covariance = fit.covariance_of(&part, 0..fit.full.len(), &fit.pooled, &covariance.beginning_at(rows.start));
-    Some((fit.pooled.values, covariance))
-}
-
-/// Windows that lie within some rows.
-fn within(fit: &Fit, rows: Range<usize>, step: usize, span: usize) -> Range<usize> {
-    let place = |row: isize| {
-        let block = row.div_euclid(step.cast_signed()) - fit.full.first;
-        usize::try_from(block).unwrap_or(0)
-    };
-    let first = place((rows.start + step).cast_signed() - 1);
-    let end = place(rows.end.cast_signed() - span.cast_signed() + step.cast_signed()).min(fit.full.len());
-    first..end.max(first)
 }
 
 /// How much neighbouring parts scatter about lines through them, over what noise explains; `None` if few of those that are `driven` say
@@ -294,6 +227,7 @@ pub(crate) fn chi_squared_beyond(value: f64, freedom: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::regression::row_covariance::RowCovariance;
 
     #[test]
     fn probabilities_are_exact_far_into_the_tail() {

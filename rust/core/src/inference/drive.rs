@@ -10,8 +10,8 @@ use crate::regression::constants::Expected;
 use crate::regression::problem::Problem;
 
 /// Standard deviations by which the median of squares of noise is larger by chance, and one of them for a single square, over the median.
-const FREE: f64 = 5.0;
-const SCATTER_OF_MEDIAN: f64 = 2.34;
+pub(crate) const FREE: f64 = 5.0;
+pub(crate) const SCATTER_OF_MEDIAN: f64 = 2.34;
 
 /// Blows are no chance where the mean of squares is so many times what noise explains: it has heavier tails than that of a few samples.
 const STRUCK: f64 = 3.0;

@@ -66,6 +66,8 @@ pub(crate) struct SlowSearch<'a> {
     pub(crate) expected: Expected,
     /// Lengths of windows for the windowed coefficients.
     pub(crate) scales: &'a [Scale],
+    /// Rows that windows span at most, if that is known.
+    pub(crate) longest: Option<usize>,
     /// The first rows after places where they may jump.
     pub(crate) breaks: &'a [usize],
     /// What errors of constants between jumps are multiplied by, in comparison with those of curves.
@@ -179,7 +181,7 @@ pub(crate) fn find(
     let whole = rows.len() as f64;
     let ends = breaks.iter().copied().chain([rows.len()]);
     let shortest = std::iter::once(0).chain(breaks.iter().copied()).zip(ends).map(|(start, end)| end - start).min();
-    let mut most = shortest.unwrap_or(0) / STRETCH;
+    let mut most = (shortest.unwrap_or(0) / STRETCH).min(search.longest.unwrap_or(usize::MAX));
     let shortened = |scale: Scale, most: usize| {
         let short = scales.iter().rev().find(|one| one.span() <= most);
         if scale.span() <= most { scale } else { short.or(scales.first()).copied().unwrap_or(scale) }
@@ -321,6 +323,7 @@ mod tests {
             noise: 0.0,
             expected: white(DEVIATION * DEVIATION),
             scales,
+            longest: None,
             breaks: &[],
             simpler: 1.0,
             instructions: Instructions::Scalar,

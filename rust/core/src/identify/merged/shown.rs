@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::MergedSession;
 use crate::identify::weak::shown_noise::{MORE, REACHES};
-use crate::inference::constancy::NoiseFrom;
+use crate::inference::part_constants::NoiseFrom;
 use crate::regression::constants::Expected;
 use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::residuals::residuals;

@@ -8,10 +8,12 @@ use crate::identify::kinds::Kind;
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
-use crate::inference::constancy::{self, NoiseFrom, TestNoise, Trend};
+use crate::inference::constancy::{self, Trend};
 use crate::inference::jumps::jump::{Jump, row_from};
 use crate::inference::jumps::search;
 use crate::inference::missing_terms::JudgedTerm;
+use crate::inference::part_constants::{NoiseFrom, TestNoise};
+use crate::inference::short_parts::{Swinging, swinging};
 use crate::inference::slowly_varying;
 use crate::inference::trend::tilted;
 use crate::regression::fit::Fit;
@@ -120,6 +122,7 @@ impl Session<'_, '_, '_> {
             found: None,
             fit: None,
             first: None,
+            longest: None,
             near: None,
             error: 1.0,
             tests: Vec::new(),
@@ -169,7 +172,7 @@ impl Session<'_, '_, '_> {
                     // Nothing more may vary that would predict well.
                     break;
                 }
-                is_free = self.set_growing_free(rows, &model, &mut decided)?;
+                is_free = self.set_unsteady_free(rows, &model, &mut decided)?;
                 if is_free {
                     continue;
                 }
@@ -209,14 +212,7 @@ impl Session<'_, '_, '_> {
     pub(crate) fn test(&mut self, rows: &Rows, decided: &mut Decided) -> Result<Option<usize>, Error> {
         let Some(fit) = &decided.fit else { return Ok(None) };
         let problem = decided.problem(decided.rows(rows), self.noise[0]);
-        let is_raised = self.noise != self.channel_noise;
-        let noise = TestNoise {
-            expected: decided.expected,
-            covariance: &decided.covariance,
-            inflation: decided.error.max(1.0),
-            from: if is_raised || self.is_rounding { NoiseFrom::Equations } else { NoiseFrom::Channels },
-            equations: 1,
-        };
+        let noise = self.test_noise(decided);
         let mut results = constancy::test(&problem, fit, noise, self.options.instructions, &mut self.stages)?;
         // Lines are asked only where rows are predicted about as well as noise allows: what a missing term leaves may follow a line, too. And only where
         // nothing varies slowly: what was taken off for that has errors which a line does not know.
@@ -236,6 +232,18 @@ impl Session<'_, '_, '_> {
         let worst = conspicuous.min_by(|a, b| a.1.probability.total_cmp(&b.1.probability)).map(|(one, _)| *one);
         let alone = decided.model.windowed.is_empty() && self.options.averaging;
         Ok(worst.filter(|_| fit.scale.is_some() || alone))
+    }
+
+    /// The noise that parts of the record are compared with.
+    fn test_noise<'a>(&self, decided: &'a Decided) -> TestNoise<'a> {
+        let is_raised = self.noise != self.channel_noise;
+        TestNoise {
+            expected: decided.expected,
+            covariance: &decided.covariance,
+            inflation: decided.error.max(1.0),
+            from: if is_raised || self.is_rounding { NoiseFrom::Equations } else { NoiseFrom::Channels },
+            equations: 1,
+        }
     }
 
     /// By how much inertia, damping and stiffness grow along the record where they are constants and something is windowed beside them: blocks lose
@@ -276,26 +284,71 @@ impl Session<'_, '_, '_> {
         Ok(trends)
     }
 
-    /// Sets the constant free that seems to grow most where rows are predicted badly, if that leaves far less: whatever is missing from an equation
-    /// follows a line a little. Returns whether it was.
-    fn set_growing_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided) -> Result<bool, Error> {
+    /// Sets the constant free that seems to grow most where rows are predicted badly, or else the one that swings most, if rows are predicted better
+    /// then. Returns whether it was.
+    fn set_unsteady_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided) -> Result<bool, Error> {
         let Some(fit) = decided.fit.as_ref().filter(|fit| fit.scale.is_some()) else { return Ok(false) };
-        if !decided.slow.is_empty() || decided.error < BADLY {
+        if !decided.slow.is_empty() {
             return Ok(false);
         }
+        let growing = if decided.error < BADLY { None } else { self.growing(rows, decided, fit)? };
+        if let Some(growing) = growing
+            && let Some(free) = self.freed(rows, model, decided, (growing, None))?
+        {
+            *decided = free;
+            return Ok(true);
+        }
+        let Some(Swinging { constant, test, rows: longest }) = self.swinging(rows, decided, fit)? else {
+            return Ok(false);
+        };
+        let swinging = decided.model.constant[constant];
+        let Some(free) = self.freed(rows, model, decided, (swinging, Some(longest)))? else { return Ok(false) };
+        *decided = free;
+        decided.tests.retain(|(one, _)| *one != swinging);
+        decided.tests.push((swinging, test));
+        Ok(true)
+    }
+
+    /// What a record is with one of its constants set free, if that predicts rows better: by far where they are predicted badly, since whatever is missing
+    /// from an equation follows a curve a little. One that differs between parts of so many rows is sought in windows no longer, and it is enough if
+    /// little is left that noise does not explain.
+    fn freed(
+        &mut self,
+        rows: &Rows,
+        model: &Model,
+        decided: &Decided,
+        (most, longest): (usize, Option<usize>),
+    ) -> Result<Option<Decided>, Error> {
+        let mut free = decided.clone();
+        free.slow.push(most);
+        free.longest = longest;
+        self.set_free(rows, model, &mut free)?;
+        let least = match longest {
+            Some(_) if decided.error < BADLY => A_LITTLE_BETTER,
+            Some(_) if free.error < BADLY => BETTER,
+            _ => FAR_BETTER,
+        };
+        let is_better = free.fit.is_some() && free.error < least * decided.error;
+        Ok(is_better.then_some(free))
+    }
+
+    /// The undecided constant that seems to grow most along the record.
+    fn growing(&mut self, rows: &Rows, decided: &Decided, fit: &Fit) -> Result<Option<usize>, Error> {
         let trends = self.trends(rows, decided, fit)?;
         let undecided = self.undecided();
         let growing = decided.model.constant.iter().zip(&trends).filter_map(|(&one, trend)| Some((one, (*trend)?)));
         let growing = growing.filter(|(one, trend)| undecided.contains(one) && trend.is_conspicuous());
-        let Some((most, _)) = growing.max_by(|a, b| a.1.excess().total_cmp(&b.1.excess())) else { return Ok(false) };
-        let mut free = decided.clone();
-        free.slow.push(most);
-        self.set_free(rows, model, &mut free)?;
-        let is_better = free.fit.is_some() && free.error < FAR_BETTER * decided.error;
-        if is_better {
-            *decided = free;
-        }
-        Ok(is_better)
+        let most = growing.max_by(|a, b| a.1.excess().total_cmp(&b.1.excess()));
+        Ok(most.map(|(most, _)| most))
+    }
+
+    /// The undecided constant that differs most between short parts of the record, if one does.
+    fn swinging(&mut self, rows: &Rows, decided: &Decided, fit: &Fit) -> Result<Option<Swinging>, Error> {
+        let problem = decided.problem(decided.rows(rows), self.noise[0]);
+        let undecided = self.undecided();
+        let may: Vec<bool> = decided.model.constant.iter().map(|one| undecided.contains(one)).collect();
+        let (noise, instructions) = (self.test_noise(decided), self.options.instructions);
+        swinging(&problem, (fit, &may), noise, instructions, &mut self.stages)
     }
 
     /// Sets all that was tested free where one of them changes, if rows are predicted better then: a parameter that varies beside one that is held
@@ -330,6 +383,7 @@ impl Session<'_, '_, '_> {
             noise: self.noise[0],
             expected: decided.expected,
             scales: &decided.scales,
+            longest: decided.longest,
             breaks: &[],
             simpler: 1.0,
             instructions,

@@ -273,6 +273,7 @@ impl Session<'_, '_, '_> {
             noise: self.noise[0],
             expected: decided.expected,
             scales: &decided.scales,
+            longest: decided.longest,
             breaks: &[],
             simpler: 1.0,
             instructions: self.options.instructions,
