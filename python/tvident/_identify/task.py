@@ -272,6 +272,7 @@ class Task:
             scans=partial(self._scans, settings) if is_strong and data.instruments is None else None,
             again_in=partial(self._again, settings) if data.is_plain else None,
             part=part if data.batch else None,
+            mask=data.mask,
         )
 
     def _scans(self, settings: dict[str, Any]) -> tuple[Scan, ...]:
@@ -391,8 +392,7 @@ class Task:
     def _motions(self, columns: list[npt.NDArray[np.number] | str], *, scanned: bool = False) -> _core.Motions:
         known = [self._known.get(name) for name in COEFFICIENTS]
         data, is_weak = self._data, not isinstance(self._request.form, StrongForm)
-        measured = data.measured(on_grid=is_weak or scanned)
-        return _core.Motions(data.angles, data.torques, known, columns, **measured)
+        return _core.Motions(data.angles, data.torques, known, columns, **data.measured(on_grid=is_weak or scanned))
 
     def _settings(self, found: Sequence[_core.Identification], searched: Searched) -> dict[str, Any]:
         """Return inputs and choices."""

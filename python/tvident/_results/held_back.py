@@ -103,6 +103,27 @@ def parts_of(samples: int, window_length: int, most: int = PARTS) -> list[tuple[
     return [(begin, end - max(1, round(_SHARE * (end - begin))), end) for begin, end in pairwise(ends)]
 
 
+def without_masked(
+    parts: list[tuple[int, int, int]], mask: npt.NDArray[np.bool_] | None, window_length: int
+) -> list[tuple[int, int, int]]:
+    """Return the parts without what a mask leaves out of all records, where something else may act: behind it a state from before is wrong.
+
+    Each begins behind the last such sample before what is held back, a test function earlier at least, and ends before the first one in
+    it. Where that leaves nothing of any part, all stay whole.
+    """
+    if mask is None:
+        return parts
+    out = np.logical_not(np.any(mask.reshape(-1, mask.shape[-1]), axis=0)).ravel()
+    kept = []
+    for begin, first, end in parts:
+        before, inside = np.flatnonzero(out[begin:first]), np.flatnonzero(out[first:end])
+        start = begin + int(before[-1]) + 1 if before.size else begin
+        stop = first + int(inside[0]) if inside.size else end
+        if stop > first and first - start >= min(window_length, first - begin):
+            kept.append((start, first, stop))
+    return kept or parts
+
+
 def stretch_of(window_length: int) -> int:
     """Return the samples of a stretch at the end of each part of a long record."""
     return max(_STRETCH, _OF_STRETCH * window_length)

@@ -53,6 +53,8 @@ class Recorded:
     again_in : callable, optional
         Identifies a stretch once more, with the same settings, its angle, which one it is, and parameters that are known; None where a
         stretch is no record of its own.
+    mask : ndarray of bool, shape (\*, n), optional
+        True where a sample counts; None where all do.
     """
 
     angles: Numbers
@@ -64,6 +66,7 @@ class Recorded:
     improve: Callable[[Any, Words], Words] | None = None
     scans: Callable[[], tuple[Scan, ...]] | None = None
     again_in: Callable[[Numbers, slice, Mapping[str, Any]], Any] | None = None
+    mask: npt.NDArray[np.bool_] | None = None
     _mark: bytes = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -72,6 +75,15 @@ class Recorded:
     def of(self, place: Any) -> Recorded | None:
         """Return some of several records."""
         return None if self.part is None else self.part(place)
+
+    @property
+    def unmasked(self) -> Numbers:
+        """Angles, missing where the mask leaves samples out."""
+        return self.angles if self.mask is None else np.where(self.mask, self.angles, np.nan)
+
+    def mask_in(self, some: slice) -> npt.NDArray[np.bool_] | None:
+        """Return the mask of a stretch."""
+        return None if self.mask is None else self.mask[..., some]
 
     @property
     def is_unchanged(self) -> bool:

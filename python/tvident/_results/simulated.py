@@ -21,6 +21,7 @@ from tvident._results.held_back import (
     parts_of,
     responses_of,
     stretch_of,
+    without_masked,
 )
 from tvident._results.recorded import Recorded, begins_once, both_or_none, still_there
 from tvident._results.response import Model, accounted_for, every_sample, samples_of
@@ -207,6 +208,7 @@ class Simulated:
         Of a long record (at 1 kHz from 11 minutes on) the same is done in a stretch at the end of every tenth, of 33 s or a hundred test
         functions, from as many samples on either side as are held back of it; what is not windowed can hardly follow so few, and is not
         identified once more.
+        Samples that a mask leaves out do not count, nor those behind them whose state would be told by samples before them.
         It is done when it is asked for first, by :meth:`summary` too, and takes about as long as to identify with ``settings=``.
 
         Returns
@@ -260,8 +262,9 @@ class Simulated:
         try:
             model = self._rest_of(parts, recorded)
             asked = ahead is None
+            parts = without_masked(parts, recorded.mask, length if isinstance(length, int) else 1)
             responses = responses_of(model, recorded.angles, recorded.torques, parts, length, simulated=asked)
-            found = judged(recorded.angles, responses, parts, simulated=asked)
+            found = judged(recorded.unmasked, responses, parts, simulated=asked)
             return found if found.why_not else replace(found, ahead=length * model.period)
         except ValueError as error:
             return HeldBack(why_not=str(error))
@@ -282,7 +285,8 @@ class Simulated:
 
         def responses(some: slice) -> list[Array]:
             rest = self._rest_of_stretch(some, slice(first, end), model)
-            found = responses_of(rest, recorded.angles[some], recorded.torques[some], [(0, first, end)], length)
+            parts = without_masked([(0, first, end)], recorded.mask_in(some), length)
+            found = responses_of(rest, recorded.angles[some], recorded.torques[some], parts, length)
             return [response[first:end] for response in found]
 
         # Of one stretch not all work has several parts.
@@ -294,7 +298,8 @@ class Simulated:
                 return HeldBack(why_not=str(error))
             finally:
                 pool.shutdown(wait=False, cancel_futures=True)
-        angle = np.concatenate([recorded.angles[some][first:end] for some in ends])
+        angles = recorded.unmasked
+        angle = np.concatenate([angles[some][first:end] for some in ends])
         parts = [(start, start, start + end - first) for start in range(0, angle.size, end - first)]
         told = judged(angle, simulated_and_predicted, parts)
         ahead, stretch = length * model.period, stretch_of(length) * model.period
