@@ -11,14 +11,23 @@ Array = npt.NDArray[np.float64]
 TRUTH = {"inertia": 0.01, "damping": 0.05, "stiffness": 10.0}
 RATE = 1000.0
 
+HELD = 50
+"""Samples over which a stiffness that swings stays the same."""
+
 
 def closed_loop(
-    seeds: range, *, angle_noise: float = 1e-2, torque_noise: float = 2e-3, n: int = 20_000, growth: float = 0.0
+    seeds: range,
+    *,
+    angle_noise: float = 1e-2,
+    torque_noise: float = 2e-3,
+    n: int = 20_000,
+    growth: float = 0.0,
+    swing: tuple[float, float] = (0.0, 1.0),
 ) -> tuple[Array, Array, Array]:
     """Give angle, torque and reference of one record a seed: T = 5 (reference - angle) - 0.05 velocity, both as measured.
 
     The torque is linear between samples, so the controller's value at a sample acts on the motion from the sample before. In the second
-    half of the record the stiffness is larger by the part `growth`.
+    half of the record the stiffness is larger by the part `growth`; or it swings by a part, at a frequency.
     """
     period, t = 1 / RATE, np.arange(n) / RATE
     inertia, damping, stiffness = TRUTH.values()
@@ -50,6 +59,9 @@ def closed_loop(
         following = 5 * (reference[:, k] - measured) - 0.05 * speed
         rate = (following - last) * RATE
         step = later if 2 * k == n else step
+        if swing[0] and k % HELD == 0:
+            system[1, 0] = -stiffness / inertia * (1 + swing[0] * np.sin(2 * np.pi * swing[1] * k / RATE))
+            step = expm(system * period)
         x, v = (step[row, 0] * x + step[row, 1] * v + step[row, 2] * last + step[row, 3] * rate for row in (0, 1))
         last = following
     return angle, torque + own, reference

@@ -144,6 +144,15 @@ def test_a_stiffness_that_changes_is_said(method: Any) -> None:
         assert any("stiffness" in line and "between parts of the record" in line for line in result.advice)
 
 
+@pytest.mark.parametrize("frequency", [0.15, 0.4])
+def test_a_stiffness_that_comes_and_goes_within_parts_is_said(frequency: float) -> None:
+    """Parts that are solved on their own take it for noise, and with wide test functions there are few of them."""
+    for angle, torque, reference in zip(*closed_loop(range(4300, 4303), swing=(0.05, frequency)), strict=True):
+        result = tvident.identify(angle, torque, sample_rate=RATE, instrument=reference)
+        assert result.record_status & Status.KIND_CONTRADICTED
+        assert any("stiffness" in line and "between parts of the record" in line for line in result.advice)
+
+
 @pytest.mark.parametrize(("method", "count"), [("auto", 10), (STRONG, 10), *long(("auto", 100), (STRONG, 100))])
 def test_constants_that_do_not_change_are_not_said_to(
     records: tuple[Array, Array, Array], method: Any, count: int

@@ -113,6 +113,11 @@ impl Test {
         Self { probability, spread: deviation / mean.abs(), deviation, squares: ratio, freedom: 1 }
     }
 
+    /// What it says of a constant in whose place a curve was found, of some deviation in the same units as the constant.
+    pub(crate) fn of_curve(probability: f64, (deviation, value): (f64, f64), (squares, freedom): (f64, usize)) -> Self {
+        Self { probability, spread: deviation / value.abs(), deviation, squares, freedom }
+    }
+
     /// How much more the parts differ than noise explains: the mean of their squared differences over the variances.
     pub(crate) fn excess(&self) -> f64 {
         self.squares

@@ -5,6 +5,7 @@
 
 use faer::linalg::solvers::{DenseSolveCore, Qr};
 use faer::{Mat, MatRef};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::regression::tapered_sums::sum_covariance;
 
@@ -104,7 +105,7 @@ fn strength(x: MatRef<'_, f64>, q: MatRef<'_, f64>, square: MatRef<'_, f64>, (us
 }
 
 /// The squared length of a vector in units of its covariance, and in how many directions that is more than rounding.
-fn distance(vector: &[f64], covariance: &[f64]) -> (f64, usize) {
+pub(crate) fn distance(vector: &[f64], covariance: &[f64]) -> (f64, usize) {
     let count = vector.len();
     let Ok(found) = Mat::from_fn(count, count, |i, j| covariance[i * count + j]).svd() else { return (0.0, 0) };
     let strengths = found.S().column_vector();
@@ -120,14 +121,24 @@ fn distance(vector: &[f64], covariance: &[f64]) -> (f64, usize) {
     (squares, directions)
 }
 
-fn condition(matrix: MatRef<'_, f64>) -> Option<f64> {
+/// The probability of a squared distance at least as large, of a covariance that is estimated (Hotelling).
+pub(crate) fn beyond((squares, directions, freedom): (f64, usize, f64)) -> f64 {
+    let (directions, rest) = (directions as f64, freedom - directions as f64 + 1.0);
+    if directions == 0.0 || rest <= 0.0 {
+        return f64::NAN;
+    }
+    let statistic = squares * rest / (freedom * directions);
+    FisherSnedecor::new(directions, rest).map_or(f64::NAN, |fisher| fisher.sf(statistic))
+}
+
+pub(crate) fn condition(matrix: MatRef<'_, f64>) -> Option<f64> {
     let found = matrix.svd().ok()?;
     let strengths = found.S().column_vector();
     let each = (0..matrix.ncols()).map(|one| strengths[one]);
     Some(each.clone().fold(0.0, f64::max) / each.fold(f64::INFINITY, f64::min))
 }
 
-fn norm(column: &[f64]) -> f64 {
+pub(crate) fn norm(column: &[f64]) -> f64 {
     column.iter().map(|value| value * value).sum::<f64>().sqrt()
 }
 

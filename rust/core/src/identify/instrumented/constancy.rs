@@ -1,6 +1,7 @@
 //! Whether constants that an instrument finds stay the same: parts of the record, each solved on its own, are compared.
 
 use crate::identify::instrumented::two_stage_rows::{TwoStageRows, WEAK_INSTRUMENT};
+use crate::identify::instrumented::waves;
 use crate::inference::constancy::{Test, compare};
 use crate::regression::tapered_sums::TAPERS;
 use crate::regression::two_stage::TwoStage;
@@ -45,6 +46,17 @@ pub(crate) fn tests(columns: &TwoStageRows, reach: usize) -> Vec<Option<Test>> {
     }
     for test in least.iter_mut().flatten() {
         test.probability = (f64::from(made) * test.probability).min(1.0);
+    }
+    // What cannot be halved is too short for a curve, too.
+    if columns.len() / PARTS[0] < REACHES * reach.max(1) {
+        return least;
+    }
+    for (least, waves) in least.iter_mut().zip(waves::tests(columns, reach)) {
+        let both = [least.take(), waves].into_iter().flatten();
+        *least = both.min_by(|a, b| a.probability.total_cmp(&b.probability));
+        if let Some(test) = least {
+            test.probability = (2.0 * test.probability).min(1.0);
+        }
     }
     least
 }

@@ -4,3 +4,4 @@ pub(crate) mod constancy;
 pub(crate) mod explained;
 pub(crate) mod record;
 pub(crate) mod two_stage_rows;
+pub(crate) mod waves;

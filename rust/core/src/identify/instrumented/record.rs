@@ -2,8 +2,6 @@
 
 use std::num::NonZeroUsize;
 
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
-
 use crate::equation::motion::{Motion, unknowns};
 use crate::equation::rows::Rows;
 use crate::error::Error;
@@ -22,7 +20,7 @@ use crate::local_polynomials::plan::LocalPolynomials;
 use crate::record::samples::Samples;
 use crate::regression::limits::status_of;
 use crate::regression::tapered_sums::TAPERS;
-use crate::regression::two_stage::TwoStage;
+use crate::regression::two_stage::{TwoStage, beyond};
 use crate::status::Status;
 use crate::weak_form::test_function::TestFunction;
 use crate::weak_form::weak_rows::WeakRows;
@@ -246,14 +244,4 @@ fn identification(
         weak: None,
     };
     (identification, test)
-}
-
-/// The probability of a squared distance at least as large, of a covariance that is estimated (Hotelling).
-fn beyond((squares, directions, freedom): (f64, usize, f64)) -> f64 {
-    let (directions, rest) = (directions as f64, freedom - directions as f64 + 1.0);
-    if directions == 0.0 || rest <= 0.0 {
-        return f64::NAN;
-    }
-    let statistic = squares * rest / (freedom * directions);
-    FisherSnedecor::new(directions, rest).map_or(f64::NAN, |fisher| fisher.sf(statistic))
 }

@@ -38,6 +38,15 @@ impl TwoStageRows {
         self.regressors.len()
     }
 
+    /// The regressors and the instruments, by unknown.
+    pub(crate) fn columns(&self) -> [&[Vec<f64>]; 2] {
+        [&self.regressors, &self.instruments]
+    }
+
+    pub(crate) fn rhs(&self) -> &[f64] {
+        &self.rhs
+    }
+
     /// What some of the rows say, of which neighbours are correlated over `reach`, with errors of so many tapers.
     pub(crate) fn solve(&self, rows: Range<usize>, (reach, tapers): (usize, usize)) -> Option<TwoStage> {
         let regressors: Vec<&[f64]> = self.regressors.iter().map(|column| &column[rows.clone()]).collect();
