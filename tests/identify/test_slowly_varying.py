@@ -11,6 +11,7 @@ import pytest
 
 import tvident
 from parameters import long
+from tvident import Status
 
 Array = npt.NDArray[np.float64]
 
@@ -170,6 +171,24 @@ def test_what_swings_several_times_in_an_eighth_of_the_record_is_seen(
         off = np.abs(getattr(result, one) - true)
         assert np.mean(off > 5 * result.stderr[one]) < 0.02
         assert np.sqrt(np.mean((off / true) ** 2)) < 0.5 * depth
+
+
+@pytest.mark.parametrize("swings", [True, False])
+def test_what_swings_and_was_given_as_constant_is_contradicted(swings: bool) -> None:
+    """It was another sensor, or noise that is not white, that was blamed."""
+    depth = 0.05 if swings else 0.0
+    rig = tvident.simulate_torsional_rig(
+        40.0,
+        500,
+        pattern="constant",
+        torque_snr_db=20,
+        angle_noise=1e-3,
+        inertia=lambda t: 0.0123 * (1 + depth * np.sin(np.pi * t)),
+    )
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=500, inertia="constant", damping="constant")
+    expected = Status.KIND_CONTRADICTED if swings else Status(0)
+    assert result.record_status == expected
+    assert any("give inertia='auto'" in one for one in result.advice) == swings
 
 
 @pytest.mark.parametrize("kind", ["slow", "at a few places"])

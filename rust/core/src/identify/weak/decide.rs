@@ -285,7 +285,7 @@ impl Session<'_, '_, '_> {
     }
 
     /// Sets the constant free that seems to grow most where rows are predicted badly, or else the one that swings most, if rows are predicted better
-    /// then. Returns whether it was.
+    /// then. Returns whether it was. One that was given as constant is contradicted.
     fn set_unsteady_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided) -> Result<bool, Error> {
         let Some(fit) = decided.fit.as_ref().filter(|fit| fit.scale.is_some()) else { return Ok(false) };
         if !decided.slow.is_empty() {
@@ -302,11 +302,15 @@ impl Session<'_, '_, '_> {
             return Ok(false);
         };
         let swinging = decided.model.constant[constant];
-        let Some(free) = self.freed(rows, model, decided, (swinging, Some(longest)))? else { return Ok(false) };
-        *decided = free;
+        let is_open = self.undecided().contains(&swinging);
+        let rows = if is_open { Cow::Borrowed(rows) } else { Cow::Owned(without_rate(rows, swinging)) };
+        let Some(free) = self.freed(&rows, model, decided, (swinging, Some(longest)))? else { return Ok(false) };
+        if is_open {
+            *decided = free;
+        }
         decided.tests.retain(|(one, _)| *one != swinging);
         decided.tests.push((swinging, test));
-        Ok(true)
+        Ok(is_open)
     }
 
     /// What a record is with one of its constants set free, if that predicts rows better: by far where they are predicted badly, since whatever is missing
@@ -342,11 +346,11 @@ impl Session<'_, '_, '_> {
         Ok(most.map(|(most, _)| most))
     }
 
-    /// The undecided constant that differs most between short parts of the record, if one does.
+    /// The constant of the motion that differs most between short parts of the record, if one does.
     fn swinging(&mut self, rows: &Rows, decided: &Decided, fit: &Fit) -> Result<Option<Swinging>, Error> {
         let problem = decided.problem(decided.rows(rows), self.noise[0]);
-        let undecided = self.undecided();
-        let may: Vec<bool> = decided.model.constant.iter().map(|one| undecided.contains(one)).collect();
+        let coefficients = self.record.coefficients.len();
+        let may: Vec<bool> = decided.model.constant.iter().map(|&one| one < coefficients).collect();
         let (noise, instructions) = (self.test_noise(decided), self.options.instructions);
         swinging(&problem, (fit, &may), noise, instructions, &mut self.stages)
     }
@@ -411,4 +415,12 @@ impl Session<'_, '_, '_> {
         }
         Ok(())
     }
+}
+
+/// Rows in which the rate of a coefficient that was given as constant, for which they have no column, makes nothing: good enough to tell whether it
+/// changes.
+fn without_rate(rows: &Rows, coefficient: usize) -> Rows {
+    let mut rows = rows.clone();
+    rows.regressors[coefficient].companion = vec![0.0; rows.len()];
+    rows
 }
