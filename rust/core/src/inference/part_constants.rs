@@ -43,14 +43,14 @@ pub(crate) fn estimate(
 ) -> Estimate {
     let constants = problem.layout.constant;
     let windows = within(fit, rows.clone(), fit.step, fit.span);
-    let (values, variances) = if windows.is_empty() {
+    let (values, covariance) = if windows.is_empty() {
         alone(problem, rows, expected, covariance, instructions)?
     } else {
         let pooled = pool(&fit.full, windows.clone(), expected, instructions)?;
-        let variances = fit.covariance_of(problem, windows, &pooled, covariance);
-        (pooled.values, variances)
+        let of_windows = fit.covariance_of(problem, windows, &pooled, covariance);
+        (pooled.values, of_windows)
     };
-    let variances: Vec<f64> = (0..constants).map(|i| inflation * variances[i * constants + i]).collect();
+    let variances: Vec<f64> = (0..constants).map(|i| inflation * covariance[i * constants + i]).collect();
     Some((values, variances))
 }
 

@@ -1,4 +1,4 @@
-//! Whether constants that an instrument finds stay the same: parts of the record, each solved on its own, are compared.
+//! Whether constants that an instrument finds stay the same: parts of the record, each solved on its own, are compared, and cosines over the record.
 
 use crate::identify::instrumented::two_stage_rows::{TwoStageRows, WEAK_INSTRUMENT};
 use crate::identify::instrumented::waves;

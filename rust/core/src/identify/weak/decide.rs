@@ -31,6 +31,10 @@ const FAR_BETTER: f64 = 0.5;
 /// The same where rows are predicted well and another changes: of constants that are set free beside it for nothing .96 is left at least.
 const A_LITTLE_BETTER: f64 = 0.9;
 
+/// The part of what noise does not explain of rows that may be left where a constant that swings is set free: it is .02 to .11 where one swings, .28 to
+/// .35 where a friction or a drag is missing.
+const LEFT_OF_SWINGS: f64 = 0.2;
+
 /// Where constants jump, those that do not change in between stand unless others predict so much better.
 const SIMPLER: f64 = 0.98;
 
@@ -164,6 +168,9 @@ impl Session<'_, '_, '_> {
         let (mut model, mut is_free) = (Cow::Borrowed(model), false);
         loop {
             if !decided.slow.is_empty() && !std::mem::take(&mut is_free) {
+                if decided.found.is_none() {
+                    decided.longest = self.swinging(rows, &decided)?.and_then(|one| one.longest);
+                }
                 self.set_free(rows, &model, &mut decided)?;
             }
             let worst = self.test(rows, &mut decided)?;
@@ -284,27 +291,33 @@ impl Session<'_, '_, '_> {
         Ok(trends)
     }
 
-    /// Sets the constant free that seems to grow most where rows are predicted badly, or else the one that swings most, if rows are predicted better
-    /// then. Returns whether it was. One that was given as constant is contradicted.
+    /// Sets the constant free that seems to grow most where rows are predicted badly, if that leaves far less, or else the one that swings most, if that
+    /// leaves hardly more than noise: whatever is missing from an equation follows a curve a little. Returns whether it was. One that was given as
+    /// constant is contradicted.
     fn set_unsteady_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided) -> Result<bool, Error> {
         let Some(fit) = decided.fit.as_ref().filter(|fit| fit.scale.is_some()) else { return Ok(false) };
         if !decided.slow.is_empty() {
             return Ok(false);
         }
         let growing = if decided.error < BADLY { None } else { self.growing(rows, decided, fit)? };
-        if let Some(growing) = growing
-            && let Some(free) = self.freed(rows, model, decided, (growing, None))?
-        {
-            *decided = free;
-            return Ok(true);
+        let swinging = self.swinging(rows, decided)?;
+        decided.longest = swinging.as_ref().and_then(|one| one.longest);
+        if let Some(growing) = growing {
+            let free = self.freed(rows, model, decided, growing)?;
+            if free.error < FAR_BETTER * decided.error {
+                *decided = free;
+                return Ok(true);
+            }
         }
-        let Some(Swinging { constant, test, rows: longest }) = self.swinging(rows, decided, fit)? else {
-            return Ok(false);
-        };
+        let Some(Swinging { constant, test, .. }) = swinging else { return Ok(false) };
         let swinging = decided.model.constant[constant];
         let is_open = self.undecided().contains(&swinging);
         let rows = if is_open { Cow::Borrowed(rows) } else { Cow::Owned(without_rate(rows, swinging)) };
-        let Some(free) = self.freed(&rows, model, decided, (swinging, Some(longest)))? else { return Ok(false) };
+        let free = self.freed(&rows, model, decided, swinging)?;
+        let is_settled = free.error - 1.0 < LEFT_OF_SWINGS * (decided.error - 1.0);
+        if !is_settled || free.error >= A_LITTLE_BETTER * decided.error {
+            return Ok(false);
+        }
         if is_open {
             *decided = free;
         }
@@ -313,27 +326,15 @@ impl Session<'_, '_, '_> {
         Ok(is_open)
     }
 
-    /// What a record is with one of its constants set free, if that predicts rows better: by far where they are predicted badly, since whatever is missing
-    /// from an equation follows a curve a little. One that differs between parts of so many rows is sought in windows no longer, and it is enough if
-    /// little is left that noise does not explain.
-    fn freed(
-        &mut self,
-        rows: &Rows,
-        model: &Model,
-        decided: &Decided,
-        (most, longest): (usize, Option<usize>),
-    ) -> Result<Option<Decided>, Error> {
+    /// What a record is with one of its constants set free; the error is infinite where that is not determined.
+    fn freed(&mut self, rows: &Rows, model: &Model, decided: &Decided, constant: usize) -> Result<Decided, Error> {
         let mut free = decided.clone();
-        free.slow.push(most);
-        free.longest = longest;
+        free.slow.push(constant);
         self.set_free(rows, model, &mut free)?;
-        let least = match longest {
-            Some(_) if decided.error < BADLY => A_LITTLE_BETTER,
-            Some(_) if free.error < BADLY => BETTER,
-            _ => FAR_BETTER,
-        };
-        let is_better = free.fit.is_some() && free.error < least * decided.error;
-        Ok(is_better.then_some(free))
+        if free.fit.is_none() {
+            free.error = f64::INFINITY;
+        }
+        Ok(free)
     }
 
     /// The undecided constant that seems to grow most along the record.
@@ -347,7 +348,8 @@ impl Session<'_, '_, '_> {
     }
 
     /// The constant of the motion that differs most between short parts of the record, if one does.
-    fn swinging(&mut self, rows: &Rows, decided: &Decided, fit: &Fit) -> Result<Option<Swinging>, Error> {
+    fn swinging(&mut self, rows: &Rows, decided: &Decided) -> Result<Option<Swinging>, Error> {
+        let Some(fit) = decided.fit.as_ref().filter(|fit| fit.scale.is_some()) else { return Ok(None) };
         let problem = decided.problem(decided.rows(rows), self.noise[0]);
         let coefficients = self.record.coefficients.len();
         let may: Vec<bool> = decided.model.constant.iter().map(|&one| one < coefficients).collect();

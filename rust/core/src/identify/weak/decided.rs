@@ -31,7 +31,7 @@ pub(crate) struct Decided {
     /// The length of windows that predicts best while nothing varies slowly. The search for what varies begins there: windows that were chosen while
     /// too little was free are so short that nothing else is found from them.
     pub(crate) first: Option<Scale>,
-    /// Rows of parts so short that what varies differs between them: windows beside which it is sought are no longer.
+    /// Rows of parts so short that they do not hide how much varies: windows beside which it is sought are no longer.
     pub(crate) longest: Option<usize>,
     /// Samples of the windows near which lengths were compared, where not all were.
     pub(crate) near: Option<usize>,
