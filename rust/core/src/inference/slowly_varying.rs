@@ -68,6 +68,8 @@ pub(crate) struct SlowSearch<'a> {
     pub(crate) scales: &'a [Scale],
     /// Rows that windows span at most, if that is known.
     pub(crate) longest: Option<usize>,
+    /// The error from which on a round is the last: what is only tried is worth no more.
+    pub(crate) hopeless: f64,
     /// The first rows after places where they may jump.
     pub(crate) breaks: &'a [usize],
     /// What errors of constants between jumps are multiplied by, in comparison with those of curves.
@@ -229,7 +231,7 @@ pub(crate) fn find(
             let chosen = (found.scale, found.equations_of, found.reach, found.terms);
             chosen == (best, scale, reach, terms) && (error - found.error).abs() <= SETTLED * error
         });
-        let is_last = round == ROUNDS || is_settled;
+        let is_last = round == ROUNDS || is_settled || error > search.hopeless;
         let mut predicted = error;
         if is_last && !rows.jumps.is_empty() {
             let rhs = without(rows, &rows.rhs, slow, &leave_gap_out);
@@ -324,6 +326,7 @@ mod tests {
             expected: white(DEVIATION * DEVIATION),
             scales,
             longest: None,
+            hopeless: f64::INFINITY,
             breaks: &[],
             simpler: 1.0,
             instructions: Instructions::Scalar,
@@ -352,6 +355,21 @@ mod tests {
         assert!((squares / ROWS as f64).sqrt() < 0.018, "{}", (squares / ROWS as f64).sqrt());
         let score = (scores / ROWS as f64).sqrt();
         assert!((0.3..2.5).contains(&score), "{score}");
+    }
+
+    #[test]
+    fn what_is_hopeless_takes_one_round() {
+        let (rows, scales, model) = (changing(), Scale::all(ROWS, 3), model());
+        let found = |hopeless: f64| {
+            let search = SlowSearch { hopeless, ..search(&rows, &model, &scales) };
+            staged(|stages| find(&search, scales[2], stages)).expect("a curve")
+        };
+        let (all, first) = (found(f64::INFINITY), found(0.0));
+        // The first round stands with the windows that it began with.
+        assert_eq!(first.equations_of.span(), scales[2].span());
+        // What is better than hopeless takes as many as ever.
+        assert_eq!(found(2.0).error.to_bits(), all.error.to_bits());
+        assert_ne!(first.error.to_bits(), all.error.to_bits());
     }
 
     #[test]

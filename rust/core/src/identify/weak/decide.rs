@@ -35,6 +35,9 @@ const A_LITTLE_BETTER: f64 = 0.9;
 /// .35 where a friction or a drag is missing.
 const LEFT_OF_SWINGS: f64 = 0.2;
 
+/// The same after the first round of a search, from which on it is not worth another.
+const HOPELESS: f64 = 0.5;
+
 /// Where constants jump, those that do not change in between stand unless others predict so much better.
 const SIMPLER: f64 = 0.98;
 
@@ -171,7 +174,7 @@ impl Session<'_, '_, '_> {
                 if decided.found.is_none() {
                     decided.longest = self.swinging(rows, &decided)?.and_then(|one| one.longest);
                 }
-                self.set_free(rows, &model, &mut decided)?;
+                self.set_free(rows, &model, &mut decided, f64::INFINITY)?;
             }
             let worst = self.test(rows, &mut decided)?;
             let Some(worst) = changing.next().or(worst) else {
@@ -303,7 +306,7 @@ impl Session<'_, '_, '_> {
         let swinging = self.swinging(rows, decided)?;
         decided.longest = swinging.as_ref().and_then(|one| one.longest);
         if let Some(growing) = growing {
-            let free = self.freed(rows, model, decided, growing)?;
+            let free = self.freed(rows, model, decided, (growing, f64::INFINITY))?;
             if free.error < FAR_BETTER * decided.error {
                 *decided = free;
                 return Ok(true);
@@ -313,7 +316,8 @@ impl Session<'_, '_, '_> {
         let swinging = decided.model.constant[constant];
         let is_open = self.undecided().contains(&swinging);
         let rows = if is_open { Cow::Borrowed(rows) } else { Cow::Owned(without_rate(rows, swinging)) };
-        let free = self.freed(&rows, model, decided, swinging)?;
+        let hopeless = 1.0 + HOPELESS * (decided.error - 1.0).max(0.0);
+        let free = self.freed(&rows, model, decided, (swinging, hopeless))?;
         let is_settled = free.error - 1.0 < LEFT_OF_SWINGS * (decided.error - 1.0);
         if !is_settled || free.error >= A_LITTLE_BETTER * decided.error {
             return Ok(false);
@@ -326,11 +330,17 @@ impl Session<'_, '_, '_> {
         Ok(is_open)
     }
 
-    /// What a record is with one of its constants set free; the error is infinite where that is not determined.
-    fn freed(&mut self, rows: &Rows, model: &Model, decided: &Decided, constant: usize) -> Result<Decided, Error> {
+    /// What a record is with one of its constants set free, or roughly where it is hopeless; the error is infinite where that is not determined.
+    fn freed(
+        &mut self,
+        rows: &Rows,
+        model: &Model,
+        decided: &Decided,
+        (constant, hopeless): (usize, f64),
+    ) -> Result<Decided, Error> {
         let mut free = decided.clone();
         free.slow.push(constant);
-        self.set_free(rows, model, &mut free)?;
+        self.set_free(rows, model, &mut free, hopeless)?;
         if free.fit.is_none() {
             free.error = f64::INFINITY;
         }
@@ -366,7 +376,7 @@ impl Session<'_, '_, '_> {
         }
         let mut free = decided.clone();
         free.slow.extend(others);
-        self.set_free(rows, model, &mut free)?;
+        self.set_free(rows, model, &mut free, f64::INFINITY)?;
         let least = if decided.error < BADLY { A_LITTLE_BETTER } else { BETTER };
         if free.fit.is_some() && free.error < least * decided.error {
             *decided = free;
@@ -374,8 +384,8 @@ impl Session<'_, '_, '_> {
         Ok(())
     }
 
-    /// Estimates what varies slowly, and the other constants beside it.
-    fn set_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided) -> Result<(), Error> {
+    /// Estimates what varies slowly, and the other constants beside it; with an error that is hopeless, roughly.
+    fn set_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided, hopeless: f64) -> Result<(), Error> {
         let instructions = self.options.instructions;
         let Some(first) = decided.first else { return Ok(()) };
         let rest = model.constant.iter().copied().filter(|one| !decided.slow.contains(one)).collect();
@@ -390,6 +400,7 @@ impl Session<'_, '_, '_> {
             expected: decided.expected,
             scales: &decided.scales,
             longest: decided.longest,
+            hopeless,
             breaks: &[],
             simpler: 1.0,
             instructions,

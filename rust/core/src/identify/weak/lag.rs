@@ -274,6 +274,7 @@ impl Session<'_, '_, '_> {
             expected: decided.expected,
             scales: &decided.scales,
             longest: decided.longest,
+            hopeless: f64::INFINITY,
             breaks: &[],
             simpler: 1.0,
             instructions: self.options.instructions,
