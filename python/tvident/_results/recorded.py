@@ -76,14 +76,14 @@ class Recorded:
         """Return some of several records."""
         return None if self.part is None else self.part(place)
 
-    @property
-    def unmasked(self) -> Numbers:
-        """Angles, missing where the mask leaves samples out."""
-        return self.angles if self.mask is None else np.where(self.mask, self.angles, np.nan)
-
     def mask_in(self, some: slice) -> npt.NDArray[np.bool_] | None:
         """Return the mask of a stretch."""
         return None if self.mask is None else self.mask[..., some]
+
+    def unmasked(self, some: slice = slice(None)) -> Numbers:
+        """Return the angles of a stretch, missing where the mask leaves samples out."""
+        angles, mask = self.angles[..., some], self.mask_in(some)
+        return angles if mask is None else np.where(mask, angles, np.nan)
 
     @property
     def is_unchanged(self) -> bool:

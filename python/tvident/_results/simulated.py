@@ -264,7 +264,7 @@ class Simulated:
             asked = ahead is None
             parts = without_masked(parts, recorded.mask, length if isinstance(length, int) else 1)
             responses = responses_of(model, recorded.angles, recorded.torques, parts, length, simulated=asked)
-            found = judged(recorded.unmasked, responses, parts, simulated=asked)
+            found = judged(recorded.unmasked(), responses, parts, simulated=asked)
             return found if found.why_not else replace(found, ahead=length * model.period)
         except ValueError as error:
             return HeldBack(why_not=str(error))
@@ -298,8 +298,7 @@ class Simulated:
                 return HeldBack(why_not=str(error))
             finally:
                 pool.shutdown(wait=False, cancel_futures=True)
-        angles = recorded.unmasked
-        angle = np.concatenate([angles[some][first:end] for some in ends])
+        angle = np.concatenate([recorded.unmasked(some)[first:end] for some in ends])
         parts = [(start, start, start + end - first) for start in range(0, angle.size, end - first)]
         told = judged(angle, simulated_and_predicted, parts)
         ahead, stretch = length * model.period, stretch_of(length) * model.period

@@ -88,7 +88,7 @@ impl Trend {
         let probability = chi_squared_beyond(squares, 1);
         // The standard deviation of a line between minus one and one.
         let deviation = self.growth.abs() / 3.0_f64.sqrt();
-        let mut test = Test { probability, spread: deviation / self.value.abs(), deviation, squares, freedom: 1 };
+        let mut test = Test::new(probability, (deviation, self.value), (squares, 1));
         test.beside_scatter(1.0, from);
         test
     }
@@ -110,12 +110,19 @@ impl Test {
         let probability = FisherSnedecor::new(independent, independent).map_or(1.0, |chance| chance.sf(ratio));
         let (count, mean) = (values.len() as f64, values.iter().sum::<f64>() / values.len() as f64);
         let deviation = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt();
-        Self { probability, spread: deviation / mean.abs(), deviation, squares: ratio, freedom: 1 }
+        Self::new(probability, (deviation, mean), (ratio, 1))
     }
 
-    /// What it says of a constant in whose place a curve was found, of some deviation in the same units as the constant.
-    pub(crate) fn of_curve(probability: f64, (deviation, value): (f64, f64), (squares, freedom): (f64, usize)) -> Self {
+    /// What a probability says of a constant of some value and deviation, and the squares over their degrees of freedom that it is of.
+    pub(crate) fn new(probability: f64, (deviation, value): (f64, f64), (squares, freedom): (f64, usize)) -> Self {
         Self { probability, spread: deviation / value.abs(), deviation, squares, freedom }
+    }
+
+    /// The least likely of several tests of a constant, with a probability that knows how many were made.
+    pub(crate) fn least_likely(tests: impl IntoIterator<Item = Self>, made: usize) -> Option<Self> {
+        let mut least = tests.into_iter().min_by(|a, b| a.probability.total_cmp(&b.probability))?;
+        least.probability = (made as f64 * least.probability).min(1.0);
+        Some(least)
     }
 
     /// How much more the parts differ than noise explains: the mean of their squared differences over the variances.
@@ -215,9 +222,7 @@ pub(crate) fn compare(parts: &[(f64, f64)]) -> Option<Test> {
     let scatter = usable.iter().map(|(value, _)| (value - mean).powi(2)).sum::<f64>() / freedom as f64;
     let noise = usable.iter().map(|(_, variance)| variance).sum::<f64>() / usable.len() as f64;
     let deviation = (scatter - noise).max(0.0).sqrt();
-    let spread = deviation / mean.abs();
-    let probability = chi_squared_beyond(squares, freedom);
-    Some(Test { probability, spread, deviation, squares: squares / freedom as f64, freedom })
+    Some(Test::new(chi_squared_beyond(squares, freedom), (deviation, mean), (squares / freedom as f64, freedom)))
 }
 
 /// The probability that a χ² variable is at least as large as a value.

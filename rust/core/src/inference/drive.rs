@@ -10,11 +10,16 @@ use crate::regression::constants::Expected;
 use crate::regression::problem::Problem;
 
 /// Standard deviations by which the median of squares of noise is larger by chance, and one of them for a single square, over the median.
-pub(crate) const FREE: f64 = 5.0;
+const FREE: f64 = 5.0;
 pub(crate) const SCATTER_OF_MEDIAN: f64 = 2.34;
 
 /// Blows are no chance where the mean of squares is so many times what noise explains: it has heavier tails than that of a few samples.
 const STRUCK: f64 = 3.0;
+
+/// The mean, or with its scatter the median, of so many independent squares over its expectation, beyond which it is no chance.
+pub(crate) fn most_by_chance(scattered: f64, independent: f64) -> f64 {
+    1.0 + FREE * scattered / independent.sqrt()
+}
 
 /// The longest run of places that hold, among some.
 pub(crate) fn longest_run(holds: &[bool], places: Range<usize>) -> Option<Range<usize>> {
@@ -53,7 +58,7 @@ pub(crate) fn drive(
         let mut squares: Vec<f64> = used().map(square).collect();
         let independent = squares.len() as f64 / expected.variance_inflation;
         let (mean, noise) = (squares.iter().sum::<f64>() / squares.len() as f64, inflation * expected.torque);
-        let most = |scattered: f64| (1.0 + FREE * scattered / independent.sqrt()) * noise;
+        let most = |scattered: f64| most_by_chance(scattered, independent) * noise;
         let is_most = median(&mut squares)? > MEDIAN_OF_SQUARES * most(SCATTER_OF_MEDIAN);
         let is_struck = mean > STRUCK * most(SQRT_2);
         Some(if is_most {

@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
 use crate::inference::constancy::{Test, compare};
-use crate::inference::drive::{Drive, FREE, SCATTER_OF_MEDIAN, drive};
+use crate::inference::drive::{Drive, SCATTER_OF_MEDIAN, drive, most_by_chance};
 use crate::inference::part_constants::{Estimate, TestNoise, estimate};
 use crate::noise::median::{MEDIAN_OF_SQUARES, median};
 use crate::regression::fit::Fit;
@@ -98,7 +98,7 @@ fn most_differ(parts: &[(f64, f64)]) -> bool {
     let mut values: Vec<f64> = usable().map(|(value, _)| value).collect();
     let Some(middle) = median(&mut values).filter(|_| values.len() >= FEWEST) else { return false };
     let mut squares: Vec<f64> = usable().map(|(value, variance)| (value - middle).powi(2) / variance).collect();
-    let by_chance = 1.0 + FREE * SCATTER_OF_MEDIAN / (squares.len() as f64).sqrt();
+    let by_chance = most_by_chance(SCATTER_OF_MEDIAN, squares.len() as f64);
     median(&mut squares).is_some_and(|square| square > MEDIAN_OF_SQUARES * by_chance)
 }
 

@@ -18,7 +18,7 @@ const REACHES: usize = 16;
 
 /// The least likely comparison of each unknown, with a probability that knows how many were made; `None` where parts know too little.
 pub(crate) fn tests(columns: &TwoStageRows, reach: usize) -> Vec<Option<Test>> {
-    let mut least: Vec<Option<Test>> = vec![None; columns.unknowns()];
+    let mut found: Vec<Vec<Test>> = vec![Vec::new(); columns.unknowns()];
     let mut made = 0;
     for parts in PARTS {
         if columns.len() / parts < REACHES * reach.max(1) {
@@ -33,32 +33,18 @@ pub(crate) fn tests(columns: &TwoStageRows, reach: usize) -> Vec<Option<Test>> {
             break;
         }
         made += 1;
-        for (one, least) in least.iter_mut().enumerate() {
+        for (one, found) in found.iter_mut().enumerate() {
             let of = |part: &TwoStage| (part.values[one], part.covariance[one * (columns.unknowns() + 1)]);
-            let found = compare(&as_normal(&known.iter().map(of).collect::<Vec<_>>(), known[0].contrast.2));
-            if found
-                .as_ref()
-                .is_some_and(|found| least.as_ref().is_none_or(|least| found.probability < least.probability))
-            {
-                *least = found;
-            }
+            found.extend(compare(&as_normal(&known.iter().map(of).collect::<Vec<_>>(), known[0].contrast.2)));
         }
     }
-    for test in least.iter_mut().flatten() {
-        test.probability = (f64::from(made) * test.probability).min(1.0);
-    }
+    let least: Vec<Option<Test>> = found.into_iter().map(|found| Test::least_likely(found, made)).collect();
     // What cannot be halved is too short for a curve, too.
     if columns.len() / PARTS[0] < REACHES * reach.max(1) {
         return least;
     }
-    for (least, waves) in least.iter_mut().zip(waves::tests(columns, reach)) {
-        let both = [least.take(), waves].into_iter().flatten();
-        *least = both.min_by(|a, b| a.probability.total_cmp(&b.probability));
-        if let Some(test) = least {
-            test.probability = (2.0 * test.probability).min(1.0);
-        }
-    }
-    least
+    let both = least.into_iter().zip(waves::tests(columns, reach));
+    both.map(|(parts, waves)| Test::least_likely(parts.into_iter().chain(waves), 2)).collect()
 }
 
 /// Estimates whose differences are as likely beside normal errors as they are beside those that are estimated with so many degrees of freedom,

@@ -40,9 +40,7 @@ pub(crate) fn tests(columns: &TwoStageRows, reach: usize) -> Vec<Option<Test>> {
     let Some(nodes) = Nodes::new(columns) else { return vec![None; count] };
     let of = |one: usize| {
         let found = made.iter().filter_map(|&waves| nodes.test(one, waves));
-        let mut least = found.min_by(|a, b| a.probability.total_cmp(&b.probability))?;
-        least.probability = (made.len() as f64 * least.probability).min(1.0);
-        Some(least)
+        Test::least_likely(found, made.len())
     };
     (0..count).map(of).collect()
 }
@@ -158,7 +156,7 @@ fn verdict(beta: MatRef<'_, f64>, spread: MatRef<'_, f64>, (one, waves): (usize,
     // Of a cosine half its square; noise has its share.
     let square: f64 = (0..waves).map(|i| values[i].powi(2) - covariance[i * (waves + 1)]).sum();
     let deviation = (0.5 * square.max(0.0)).sqrt();
-    Some(Test::of_curve(probability, (deviation, beta[(one, 0)]), (squares / directions as f64, directions)))
+    Some(Test::new(probability, (deviation, beta[(one, 0)]), (squares / directions as f64, directions)))
 }
 
 #[cfg(test)]

@@ -384,6 +384,28 @@ impl Session<'_, '_, '_> {
         Ok(())
     }
 
+    /// The search for what varies slowly along all of the record, without an end before the last round.
+    pub(crate) fn slow_search<'a>(
+        &self,
+        rows: &'a Rows,
+        ordered: &'a Model,
+        decided: &'a Decided,
+    ) -> slowly_varying::SlowSearch<'a> {
+        slowly_varying::SlowSearch {
+            rows,
+            model: ordered,
+            coefficients: decided.slow.len(),
+            noise: self.noise[0],
+            expected: decided.expected,
+            scales: &decided.scales,
+            longest: decided.longest,
+            hopeless: f64::INFINITY,
+            breaks: &[],
+            simpler: 1.0,
+            instructions: self.options.instructions,
+        }
+    }
+
     /// Estimates what varies slowly, and the other constants beside it; with an error that is hopeless, roughly.
     fn set_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided, hopeless: f64) -> Result<(), Error> {
         let instructions = self.options.instructions;
@@ -391,20 +413,7 @@ impl Session<'_, '_, '_> {
         let rest = model.constant.iter().copied().filter(|one| !decided.slow.contains(one)).collect();
         decided.model = Model { constant: rest, ..model.clone() };
         let ordered = decided.ordered();
-        let slow = decided.slow.len();
-        let search = slowly_varying::SlowSearch {
-            rows,
-            model: &ordered,
-            coefficients: slow,
-            noise: self.noise[0],
-            expected: decided.expected,
-            scales: &decided.scales,
-            longest: decided.longest,
-            hopeless,
-            breaks: &[],
-            simpler: 1.0,
-            instructions,
-        };
+        let search = slowly_varying::SlowSearch { hopeless, ..self.slow_search(rows, &ordered, decided) };
         let mut found = slowly_varying::find(&search, first, &mut self.stages)?;
         if !rows.jumps.is_empty() {
             // What jumps may be the inertia as well as the stiffness.

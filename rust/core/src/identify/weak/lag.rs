@@ -15,7 +15,7 @@ use crate::identify::weak::decided::Decided;
 use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::{CONSPICUOUS, JudgedTerm};
-use crate::inference::slowly_varying::{SlowSearch, followed, without};
+use crate::inference::slowly_varying::{followed, without};
 use crate::noise::median::median;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
@@ -266,19 +266,7 @@ impl Session<'_, '_, '_> {
         let in_equations = |(value, is_usable): (&f64, &bool)| if *is_usable { *value } else { 0.0 };
         let column: Vec<f64> = column.iter().zip(&rows.usable).map(in_equations).collect();
         let model = decided.ordered();
-        let search = SlowSearch {
-            rows,
-            model: &model,
-            coefficients: decided.slow.len(),
-            noise: self.noise[0],
-            expected: decided.expected,
-            scales: &decided.scales,
-            longest: decided.longest,
-            hopeless: f64::INFINITY,
-            breaks: &[],
-            simpler: 1.0,
-            instructions: self.options.instructions,
-        };
+        let search = self.slow_search(rows, &model, decided);
         let varying = followed(&search, found, &column, &mut self.stages)?;
         Ok(varying.map(|varying| {
             let left = without(rows, &column, &decided.slow, &varying);
