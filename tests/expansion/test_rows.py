@@ -1,9 +1,11 @@
 """Rows of expanded coefficients, their noise, and their least squares, compared with slow references."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import islice
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -11,21 +13,32 @@ from numpy.polynomial import Polynomial
 
 from parameters import examples
 from reference.expansion import generalised, product_column
-from tvident._expansion import Basis, Coordinate, ExpandedRecord, ExpandedUnknown, Linearised
+from tvident._expansion import (
+    Basis,
+    Coordinate,
+    Curves,
+    ExpandedRecord,
+    ExpandedUnknown,
+    Linearised,
+    Noise,
+    of_one,
+)
 from tvident._expansion.covariance import RIDGE, Whitening
 from tvident._expansion.families import FAMILIES, family_of
 
 ROUNDING = 1e-9
 """Sums of some hundred products, relative to the largest; second derivatives lose some digits in differences."""
 
+Array = npt.NDArray[np.float64]
+
 PERIOD = 0.01
 
 
 def record(seed: int, samples: int, half: int, exponent: int) -> ExpandedRecord:
     generator = np.random.default_rng(seed)
-    there = np.ones(samples, bool)
-    angle, torque = generator.standard_normal((2, samples))
-    return ExpandedRecord(angle, torque, there, there, PERIOD, half, exponent)
+    there = np.ones((1, samples), bool)
+    angle, torque = generator.standard_normal((2, 1, samples))
+    return ExpandedRecord(angle, torque, there, there[0], PERIOD, half, exponent)
 
 
 def of_time(family: str, size: int, samples: int) -> Basis:
@@ -44,19 +57,19 @@ def test_columns_are_the_integrals_of_products(
 ) -> None:
     samples = 90
     one = record(seed, samples, half, exponent)
-    unknown = ExpandedUnknown(role, role, of_time("legendre", size, samples))
-    found = one.columns([unknown], one.angle, slice(0, (one.rows - 1) * one.stride + one.length))
+    unknown = ExpandedUnknown(role, of_one(role), of_time("legendre", size, samples))
+    found = one.columns([unknown], one.angles, slice(0, (one.rows - 1) * one.stride + one.length))[:, 0]
     for number in range(size):
         # A Legendre polynomial of time in seconds.
         legendre = np.polynomial.Legendre.basis(number)(Polynomial([-1, 2 / ((samples - 1) * PERIOD)]))
         if isinstance(legendre, float):
             legendre = Polynomial([legendre])
-        expected = product_column(one.angle, legendre, parts, half, exponent, PERIOD)[:: one.stride]
+        expected = product_column(one.angles[0], legendre, parts, half, exponent, PERIOD)[:: one.stride]
         scale = np.abs(expected).max() + np.abs(found).max()
         # The library also takes the sum of every kernel to what an integral would be.
         x = np.arange(-half, half + 1) / half
         lost = abs(np.sum((Polynomial([1, 0, -1]) ** exponent).deriv(parts)(x))) if parts else 0.0
-        tolerance = ROUNDING * scale + 3 * lost / (half * PERIOD) ** parts * np.abs(one.angle).max()
+        tolerance = ROUNDING * scale + 3 * lost / (half * PERIOD) ** parts * np.abs(one.angles).max()
         assert np.abs(found[:, number] - expected).max() <= tolerance
 
 
@@ -66,13 +79,14 @@ def test_momentum_is_inertia_and_its_rate() -> None:
     everything = slice(0, (one.rows - 1) * one.stride + one.length)
     basis = of_time("chebyshev", 4, samples)
     columns = {
-        role: one.columns([ExpandedUnknown(role, role, basis)], one.angle, everything)
+        role: one.columns([ExpandedUnknown(role, of_one(role), basis)], one.angles, everything)[:, 0]
         for role in ("inertia", "momentum")
     }
     factors = np.array([1.0, 0.3, -0.2, 0.1])
     rate = np.polynomial.Chebyshev(factors).deriv() * (2 / ((samples - 1) * PERIOD))
     damping = rate.convert(kind=np.polynomial.Chebyshev)
-    more = one.columns([ExpandedUnknown("damping", "damping", of_time("chebyshev", 3, samples))], one.angle, everything)
+    unknown = ExpandedUnknown("damping", of_one("damping"), of_time("chebyshev", 3, samples))
+    more = one.columns([unknown], one.angles, everything)[:, 0]
     found = columns["momentum"] @ factors - columns["inertia"] @ factors
     np.testing.assert_allclose(
         found, more @ np.asarray(damping.coef, np.float64), atol=ROUNDING * np.abs(columns["inertia"]).max()
@@ -105,34 +119,80 @@ def test_whitening_is_that_of_the_dense_covariance(seed: int, rows: int, lags: i
 
 
 @pytest.mark.parametrize("role", ["stiffness", "damping", "inertia"])
-def test_least_squares_are_those_of_dense_matrices_with_the_noise_of_the_angle_taken_off(role: str) -> None:
-    one, samples = record(3, 400, 24, 6), 400
+@pytest.mark.parametrize("equations", [1, 2])
+@pytest.mark.parametrize("trials", [1, 2])
+def test_least_squares_are_those_of_dense_matrices_with_the_noise_of_the_angles_taken_off(
+    role: str, equations: int, trials: int
+) -> None:
+    samples, generator = 400, np.random.default_rng(3)
     basis = of_time("bspline", 5, samples)
-    level = 1 + 0.5 * np.sin(np.arange(samples) / 60)
     nothing = np.zeros(samples)
-    curves = [(role, [level, nothing, nothing])]
-    noise = (0.04, 0.3)
-    around = Linearised(one, curves, nothing, noise, [])
-    unknowns = [ExpandedUnknown(role, role, basis), ExpandedUnknown("offset", "term", None, np.ones(samples))]
+    level = 1 + 0.5 * np.sin(np.arange(samples) / 60)
+    # Between the first mass and the second, or the ground; then what only the last equation has.
+    between = [(e, role, c, 1.0 if e == c else -1.0) for e in range(equations) for c in range(equations)]
+    other = "damping" if role == "stiffness" else "stiffness"
+    last = ((equations - 1, other, equations - 1, 2.0),)
+    noise = [0.04, 0.01][:equations], [0.3, 0.2][:equations]
+    records = []
+    for trial in range(trials):
+        length = samples - 60 * trial
+        there = np.ones((equations, length), bool)
+        there[-1, 100:103] = trial == 0
+        angles, torques = generator.standard_normal((2, equations, length))
+        records.append(
+            ExpandedRecord(angles, torques, there, np.ones(length, bool), PERIOD, 24, 6, terms=[np.ones(length)])
+        )
+    curves: Curves = [(between, [level, nothing, nothing]), (last, [0.3 * level, nothing])]
+    around = Linearised(records, curves, noise, [])
+    unknowns = [
+        ExpandedUnknown(role, between, basis),
+        ExpandedUnknown("last", last),
+        ExpandedUnknown("offset", ((0, "term", 0, 1.0),)),
+    ]
     found = around.solve(unknowns)
-
-    everything = slice(0, (one.rows - 1) * one.stride + one.length)
-    weights, kernel = one.noise_kernels(curves, everything), one.kernels.value
-    entering, torque = np.zeros((one.rows, samples)), np.zeros((one.rows, samples))
-    for row in range(one.rows):
-        some = slice(row * one.stride, row * one.stride + one.length)
-        entering[row, some], torque[row, some] = weights[row], kernel
-    covariance = noise[0] * entering @ entering.T + noise[1] * torque @ torque.T
-    covariance += RIDGE * np.diag(np.diagonal(covariance))
-    rhs = torque @ one.torque
-    shown = -noise[0] * entering.T @ np.linalg.solve(covariance, rhs - entering @ one.angle)
-    design = one.columns(unknowns, one.angle - shown, everything)
-    values, normal, misfit = generalised(design, rhs - entering @ shown, covariance)
+    covariances, designs, sides = zip(*(_dense(one, curves, noise, unknowns) for one in records), strict=True)
+    covariance = _block_diagonal(covariances)
+    values, normal, misfit = generalised(np.concatenate(designs), np.concatenate(sides), covariance)
     # The covariance is ill-conditioned where the test function suppresses noise: its condition number times rounding.
     tolerance = np.linalg.cond(covariance) * 1e-13 + 1e-8
     np.testing.assert_allclose(found.values, values, rtol=tolerance, atol=tolerance * np.abs(values).max())
     np.testing.assert_allclose(found.covariance, normal, rtol=tolerance, atol=tolerance * np.abs(normal).max())
     assert found.misfit == pytest.approx(misfit, rel=tolerance)
+
+
+def _dense(one: ExpandedRecord, curves: Curves, noise: Noise, unknowns: list[ExpandedUnknown]) -> tuple[Array, ...]:
+    """Return the covariance, the columns and the right-hand sides of a record's rows that are usable, with dense matrices."""
+    everything = slice(0, (one.rows - 1) * one.stride + one.length)
+    weights, kernel = one.noise_kernels(curves, everything), one.kernels.value
+    count, channels, samples = one.equations, len(one.angles), one.samples
+    entering = np.zeros((one.rows, count, channels, samples))
+    torque = np.zeros((one.rows, count, count, samples))
+    for row in range(one.rows):
+        some = slice(row * one.stride, row * one.stride + one.length)
+        for (equation, channel), each in weights.items():
+            entering[row, equation, channel, some] = each[row]
+        for equation in range(count):
+            torque[row, equation, equation, some] = kernel
+    usable = one.usable_rows().ravel()
+    entering, torque = (each.reshape(one.rows * count, -1)[usable] for each in (entering, torque))
+    of_angles, of_torques = (np.repeat(each, samples) for each in noise)
+    covariance = entering * of_angles @ entering.T + torque * of_torques @ torque.T
+    covariance += RIDGE * np.diag(np.diagonal(covariance))
+    rhs = torque @ one.torques.ravel()
+    # None of the terms is known about.
+    left = rhs - entering @ one.angles.ravel()
+    shown = -of_angles * (entering.T @ np.linalg.solve(covariance, left))
+    columns = one.columns(unknowns, one.angles - shown.reshape(channels, samples), everything)
+    return covariance, columns.reshape(one.rows * count, -1)[usable], rhs - entering @ shown
+
+
+def _block_diagonal(blocks: Sequence[Array]) -> Array:
+    found = np.zeros((sum(map(len, blocks)),) * 2)
+    first = 0
+    for one in blocks:
+        found[first : first + len(one), first : first + len(one)] = one
+        first += len(one)
+    return found
 
 
 @pytest.mark.parametrize("name", [*FAMILIES, "bspline"])
@@ -161,14 +221,15 @@ def test_blocks_are_summed_and_sizes_compared_as_if_each_were_solved(
     # The same functions without their blocks.
     plain = Basis(both.coordinates, [replace(pulse, block=None)] * 2, sizes)
     found, expected = (
-        one.columns([ExpandedUnknown("k", "stiffness", each)], one.angle, slice(None)) for each in (both, plain)
+        one.columns([ExpandedUnknown("k", of_one("stiffness"), each)], one.angles, slice(None))[:, 0]
+        for each in (both, plain)
     )
     np.testing.assert_allclose(found, expected, atol=ROUNDING * np.abs(expected).max())
-    unknowns = [ExpandedUnknown("k", "stiffness", both), ExpandedUnknown("c", "damping")]
+    unknowns = [ExpandedUnknown("k", of_one("stiffness"), both), ExpandedUnknown("c", of_one("damping"))]
     # Columns that are made of others are left to decompositions.
-    unknowns += [ExpandedUnknown("again", "damping")] if same else []
-    nothing = ("stiffness", [np.zeros(samples)])
-    around = Linearised(one, [nothing], np.zeros(samples), (1e-6, 1.0), [])
+    unknowns += [ExpandedUnknown("again", of_one("damping"))] if same else []
+    nothing = (of_one("stiffness"), [np.zeros(samples)])
+    around = Linearised([one], [nothing], ([1e-6], [1.0]), [])
     scored, fitted = around.score(unknowns), around.solve(unknowns)
     assert scored.criterion == pytest.approx(fitted.scored.criterion, rel=1e-9)
     white = np.concatenate(list(around.whitened(unknowns)))

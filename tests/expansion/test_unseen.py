@@ -24,14 +24,14 @@ NEAR_ENDS = 400
 
 
 def record(samples: int, missing: slice = slice(0, 0)) -> ExpandedRecord:
-    usable = np.ones(samples, bool)
-    usable[missing] = False
-    nothing = np.zeros(samples)
+    usable = np.ones((1, samples), bool)
+    usable[0, missing] = False
+    nothing = np.zeros((1, samples))
     return ExpandedRecord(nothing, nothing, usable, np.ones(samples, bool), 1 / RATE, half=30, exponent=9)
 
 
 def test_ends_and_gaps_are_not_seen() -> None:
-    unseen = Unseen(record(4000, slice(2000, 2100)))
+    unseen = Unseen([record(4000, slice(2000, 2100))])
     # The first equation has its centre at sample 30, and sees 15 samples on both sides.
     assert list(np.flatnonzero(np.diff(unseen.is_seen.astype(int))) + 1) == [15, 1981, 2115, 3981]
     assert unseen.places.min() == unseen.step
@@ -42,7 +42,7 @@ def test_ends_and_gaps_are_not_seen() -> None:
 
 
 def test_a_sine_bends_as_often_as_it_does() -> None:
-    unseen, t = Unseen(record(20_000)), np.arange(20_000) / RATE
+    unseen, t = Unseen([record(20_000)]), np.arange(20_000) / RATE
     pulsation = 3.0
     bend = unseen.bend(2 + np.sin(pulsation * t))
     assert bend is not None
@@ -53,7 +53,7 @@ def test_a_sine_bends_as_often_as_it_does() -> None:
 
 
 def test_equations_are_second_differences_of_the_curve() -> None:
-    unseen = Unseen(record(4000))
+    unseen = Unseen([record(4000)])
     places = np.linspace(0, 1, 4000)
     basis = Basis([Coordinate(places, np.zeros((2, 4000)), (0.0, 4.0))], [family_of("chebyshev", 3)], [6])
     factors = np.random.default_rng(0).standard_normal(6)

@@ -16,7 +16,7 @@ from tvident._baselines.discrete import tvarx
 from tvident._baselines.recursive import random_walk_smoother, recursive_least_squares
 from tvident._baselines.sums import expanded_least_squares
 from tvident._equation import COEFFICIENTS
-from tvident._expansion import ExpandedRecord, Expansion
+from tvident._expansion import ExpandedRecord, Expansion, of_one
 from tvident._files import aligned
 from tvident._identify import identify
 from tvident._regression import rolling_least_squares
@@ -222,11 +222,13 @@ def _rise_time(value: Array, truth: Array, rate: float) -> float:
 
 def _explained(found: ValueAndError, angle: Array, torque: Array, rate: float) -> dict[str, float]:
     """Return how much of the torque's variance the parameters account for, in averages over a test function of a tenth of a second."""
-    values, there = found[0], np.ones(angle.size, bool)
-    record = ExpandedRecord(angle, torque, there, there, 1 / rate, max(4, int(0.05 * rate)), 7)
+    values, there = found[0], np.ones((1, angle.size), bool)
+    record = ExpandedRecord(
+        angle[np.newaxis], torque[np.newaxis], there, there[0], 1 / rate, max(4, int(0.05 * rate)), 7
+    )
     everything = slice(0, (record.rows - 1) * record.stride + record.length)
-    curves = [(name, [np.nan_to_num(one)]) for name, one in zip(COEFFICIENTS, values, strict=True)]
-    predicted = np.einsum("ij,ij->i", record.noise_kernels(curves, everything), record.windows(angle[everything]))
+    curves = [(of_one(name), [np.nan_to_num(one)]) for name, one in zip(COEFFICIENTS, values, strict=True)]
+    predicted = np.einsum("ij,ij->i", record.noise_kernels(curves, everything)[0, 0], record.windows(angle[everything]))
     measured = record.windows(torque[everything]) @ record.kernels.value
     known = np.asarray(np.all(np.isfinite(values), axis=0), np.float64)
     usable = np.all(record.windows(known[everything]) > 0, axis=1)

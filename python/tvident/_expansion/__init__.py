@@ -3,9 +3,18 @@
 from tvident._expansion.basis import Basis, Coordinate
 from tvident._expansion.expansion import Expansion
 from tvident._expansion.families import family_from, plain_family
-from tvident._expansion.fit import Curves, Fitted, Linearised
+from tvident._expansion.fit import Fitted, Linearised
 from tvident._expansion.rivals import Rival, Rivals
-from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown, condition_of_curves, placed, reach_over
+from tvident._expansion.rows import (
+    Curves,
+    Entries,
+    ExpandedRecord,
+    ExpandedUnknown,
+    condition_of_curves,
+    of_one,
+    placed,
+    reach_over,
+)
 from tvident._expansion.search import (
     DERIVATIVES,
     SLACK,
@@ -15,8 +24,10 @@ from tvident._expansion.search import (
     along_record,
     curve_along,
     curves_of,
+    rates_of,
 )
 from tvident._expansion.steps import variance_of_steps
+from tvident._expansion.whitened_rows import Noise
 
 __all__ = [
     "DERIVATIVES",
@@ -24,11 +35,13 @@ __all__ = [
     "Basis",
     "Coordinate",
     "Curves",
+    "Entries",
     "ExpandedRecord",
     "ExpandedUnknown",
     "Expansion",
     "Fitted",
     "Linearised",
+    "Noise",
     "RecordPart",
     "Rival",
     "Rivals",
@@ -39,8 +52,10 @@ __all__ = [
     "curve_along",
     "curves_of",
     "family_from",
+    "of_one",
     "placed",
     "plain_family",
+    "rates_of",
     "reach_over",
     "variance_of_steps",
 ]

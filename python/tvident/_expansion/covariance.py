@@ -13,7 +13,7 @@ RIDGE = 1e-6
 """Added to the variance of a row, relative to it, so that frequencies that the test function suppresses do not count."""
 
 BLOCK = 32
-"""Rows of a block: more than share samples with one, which are 23 at most."""
+"""Times of rows in a block: more than share samples with one, which are 23 at most."""
 
 
 _PROBES = 4
@@ -29,12 +29,14 @@ class Whitening:
         ``band[i, l]`` is the covariance of the rows i and i - l.
     usable : ndarray of bool, shape (rows,)
         Rows that are no equations count as independent of all others.
+    equations : int
+        Rows at one time, which follow each other.
     """
 
-    def __init__(self, band: Array, usable: npt.NDArray[np.bool_]) -> None:
+    def __init__(self, band: Array, usable: npt.NDArray[np.bool_], equations: int = 1) -> None:
         rows, lags = band.shape
         self.rows = rows
-        self._width = width = BLOCK
+        self._width = width = BLOCK * equations
         self._blocks = blocks = -(-rows // width)
         full = np.zeros((blocks * width, lags))
         full[:rows] = np.where(usable[:, np.newaxis], band, 0.0)

@@ -17,13 +17,10 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from tvident._expansion.covariance import Whitening
-from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown
+from tvident._expansion.rows import Curves, ExpandedRecord, ExpandedUnknown
+from tvident._expansion.whitened_rows import Noise, WhitenedRows
 
 Array: TypeAlias = npt.NDArray[np.float64]
-
-Curves: TypeAlias = list[tuple[str, list[Array]]]
-"""Coefficients by their roles: values at the samples, and derivatives by time."""
 
 SINGULAR = 1e-12
 """Columns are dependent where the smallest singular value of the scaled factor is this part of the largest."""
@@ -108,65 +105,23 @@ class Fitted:
 
 
 class Linearised:
-    """Rows of a record around some curves: what noise they have, and their regressors without it.
+    """Rows of some records around the same curves.
 
     Parameters
     ----------
-    record : ExpandedRecord
+    records : sequence of ExpandedRecord
     curves : Curves
-        Inertia, damping and stiffness, about.
-    terms : Array
-        Torque of the further terms, about, at every sample.
-    noise : (float, float)
-        Variances of the noise of angle and torque.
+        All coefficients, about.
+    noise : Noise
+        Variances of the noise of every angle and of every torque.
     known : Curves
         Those of the curves that are known beforehand.
     """
 
-    def __init__(
-        self, record: ExpandedRecord, curves: Curves, terms: Array, noise: tuple[float, float], known: Curves
-    ) -> None:
-        self.record = record
-        usable = record.usable_rows()
-        torque, late = record.late()
-        lags, rows = record.lags, record.rows
-        band, left, rhs = np.zeros((rows, lags)), np.zeros(rows), np.zeros(rows)
-        for some, samples in record.pieces(lags - 1):
-            entering = record.noise_kernels(curves, samples)
-            right = record.windows(torque[samples]) @ late
-            rhs[some] = right
-            motion = np.einsum("ij,ij->i", entering, record.windows(record.angle[samples]))
-            left[some] = right - motion - record.windows(terms[samples]) @ record.kernels.value
-            for lag in range(lags):
-                apart, now = lag * record.stride, slice(some.start + lag, some.stop)
-                count = len(entering) - lag
-                if count <= 0:
-                    break
-                shared = np.einsum("ij,ij->i", entering[lag:, : record.length - apart], entering[:count, apart:])
-                white = float(late[: record.length - apart] @ late[apart:])
-                band[now, lag] = noise[0] * shared + noise[1] * white
-        left[~usable] = 0.0
-        self.usable, self.residuals = usable, left[usable]
-        self.whitening = Whitening(band, usable)
-        self.observations = float(usable.sum()) * self.whitening.worth
-        weights = self.whitening.solve(left)
-        shown = np.zeros(record.angle.size)
-        self.rhs = rhs.copy()
-        for some, samples in record.pieces():
-            entering = record.noise_kernels(curves, samples) * weights[some, np.newaxis]
-            count, piece = some.stop - some.start, shown[samples]
-            for place in range(record.length):
-                piece[place : place + (count - 1) * record.stride + 1 : record.stride] += entering[:, place]
-        shown *= -noise[0]
-        for some, samples in record.pieces():
-            entering = record.noise_kernels(curves, samples)
-            self.rhs[some] = rhs[some] - np.einsum("ij,ij->i", entering, record.windows(shown[samples]))
-            if known:
-                entering = record.noise_kernels(known, samples)
-                angle = record.angle[samples] - shown[samples]
-                self.rhs[some] -= np.einsum("ij,ij->i", entering, record.windows(angle))
-        self.rhs[~usable] = 0.0
-        self.angle = record.angle - shown
+    def __init__(self, records: Sequence[ExpandedRecord], curves: Curves, noise: Noise, known: Curves) -> None:
+        self._each = [WhitenedRows(record, curves, noise, known) for record in records]
+        self.residuals = np.concatenate([one.residuals for one in self._each])
+        self.observations = sum(one.observations for one in self._each)
 
     def solve(self, unknowns: Sequence[ExpandedUnknown], beside: Array | None = None) -> Fitted:
         """Return the least-squares solution for some unknowns: by QR decompositions of blocks of whitened rows where these need them.
@@ -200,37 +155,44 @@ class Linearised:
         return sum(map(_products, self.whitened(unknowns)), start)
 
     def whitened(self, unknowns: Sequence[ExpandedUnknown]) -> Iterator[Array]:
-        """Give pieces of whitened rows, the right-hand side last."""
-        record, before = self.record, None
-        for some, samples in record.pieces():
-            design = np.column_stack([record.columns(unknowns, self.angle, samples), self.rhs[some]])
-            design[~self.usable[some]] = 0.0
-            white, before = self.whitening.whiten(design, some.start, before)
-            yield white
-
-    def _scores(self, unknowns: Sequence[ExpandedUnknown], fitted: Fitted) -> Iterator[Array]:
-        """Give pieces of whitened rows times their residuals; times the root, columns are orthonormal, however hard to tell apart."""
-        for white in self.whitened(unknowns):
-            left = white[:, -1] - white[:, :-1] @ fitted.values
-            yield white[:, :-1] @ fitted.root * left[:, np.newaxis]
+        """Give pieces of whitened rows, the right-hand side last, record by record."""
+        for one in self._each:
+            yield from one.whitened(unknowns)
 
     def root_of_residuals(self, unknowns: Sequence[ExpandedUnknown], fitted: Fitted) -> Array:
         """Return a root of the covariance that follows from whitened residuals and their correlation (Newey and West), not from noise."""
-        record = self.record
-        reach = int(np.ceil(4 * (max(1, record.rows) / 100) ** (2 / 9))) + record.lags
         middle = np.zeros((fitted.values.size, fitted.values.size))
         if fitted.beside is not None:
             middle += _products(fitted.beside[:, :-1] @ fitted.root)
-        nothing = last = np.zeros((reach, fitted.values.size))
-        for scores in chain(self._scores(unknowns, fitted), [nothing]):
-            # Weights that fall linearly with the lag are how often both rows lie in one of all windows of so many rows.
-            sums = np.cumsum(np.concatenate([nothing[:1], last, scores]), axis=0)
-            middle += _products(sums[reach + 1 :] - sums[: -reach - 1]) / (reach + 1)
-            last = np.concatenate([last, scores])[-reach:]
+        for one in self._each:
+            middle += _correlated_scores(one, unknowns, fitted)
         if not np.isfinite(middle).all():
             return np.full_like(fitted.root, np.nan)
         squares, axes = np.linalg.eigh(middle)
         return np.asarray(fitted.root @ (axes * np.sqrt(np.maximum(squares, 0.0))))
+
+
+def _scores(rows: WhitenedRows, unknowns: Sequence[ExpandedUnknown], fitted: Fitted) -> Iterator[Array]:
+    """Give pieces of whitened rows times their residuals; times the root, columns are orthonormal, however hard to tell apart."""
+    for white in rows.whitened(unknowns):
+        left = white[:, -1] - white[:, :-1] @ fitted.values
+        yield white[:, :-1] @ fitted.root * left[:, np.newaxis]
+
+
+def _correlated_scores(rows: WhitenedRows, unknowns: Sequence[ExpandedUnknown], fitted: Fitted) -> Array:
+    """Return the covariance of the sum of a record's scores, from those of rows that are near each other."""
+    record = rows.record
+    reach = int(np.ceil(4 * (max(1, record.rows) / 100) ** (2 / 9))) + record.lags
+    # Rows of all equations at one time follow each other.
+    reach *= record.equations
+    middle = np.zeros((fitted.values.size, fitted.values.size))
+    nothing = last = np.zeros((reach, fitted.values.size))
+    for scores in chain(_scores(rows, unknowns, fitted), [nothing]):
+        # Weights that fall linearly with the lag are how often both rows lie in one of all windows of so many rows.
+        sums = np.cumsum(np.concatenate([nothing[:1], last, scores]), axis=0)
+        middle += _products(sums[reach + 1 :] - sums[: -reach - 1]) / (reach + 1)
+        last = np.concatenate([last, scores])[-reach:]
+    return middle
 
 
 def _products(rows: Array) -> Array:

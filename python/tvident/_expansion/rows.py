@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._expansion.basis import AT_A_TIME, Basis
+from tvident._expansion.covariance import BLOCK
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -24,6 +25,13 @@ _MOVES = 4.0
 
 PIECE = 4096
 """Rows that are in memory at a time: whole blocks of the covariance's factor."""
+
+Entries: TypeAlias = Sequence[tuple[int, str, int, float]]
+"""Where an unknown appears: equation, role, channel of the motion or number of the term, factor. The role is ``"inertia"``, ``"momentum"``,
+``"damping"``, ``"stiffness"`` or ``"term"``."""
+
+Curves: TypeAlias = Sequence[tuple[Entries, Sequence[Array]]]
+"""Coefficients: where they appear, their values and their derivatives by time at the samples."""
 
 
 @dataclass(frozen=True)
@@ -57,23 +65,19 @@ class Kernels:
 
 @dataclass(frozen=True)
 class ExpandedUnknown:
-    """One unknown of the equation: a factor, or the factors of an expansion.
+    """One unknown of the equations: a factor, or the factors of an expansion.
 
     Parameters
     ----------
     name : str
-    role : str
-        ``"inertia"``, ``"momentum"``, ``"damping"``, ``"stiffness"`` or ``"term"``.
+    entries : Entries
     basis : Basis, optional
         None for a constant.
-    samples : ndarray, shape (n,), optional
-        Of a term.
     """
 
     name: str
-    role: str
+    entries: Entries
     basis: Basis | None = None
-    samples: Array | None = None
 
     @property
     def size(self) -> int:
@@ -140,36 +144,55 @@ def parts(role: str, kernels: Kernels) -> list[Array]:
     return [kernels.value]
 
 
+def of_one(role: str, number: int = 0) -> Entries:
+    """Return where an unknown of one equation of one angle appears; terms have a number."""
+    return ((0, role, number, 1.0),)
+
+
 @dataclass(frozen=True)
 class ExpandedRecord:
-    """A record as rows are made of it.
+    """A record as rows are made of it: those of all equations at one time follow each other.
 
     Parameters
     ----------
-    angle, torque : ndarray, shape (n,)
-        Zero where they are not usable.
-    usable : ndarray of bool, shape (n,)
-        Whether a row may use a sample.
+    angles : ndarray, shape (channels, n)
+    torques : ndarray, shape (equations, n)
+        Zero where they are not usable, as the angles.
+    usable : ndarray of bool, shape (equations, n)
+        Whether a row of an equation may use a sample.
     centres : ndarray of bool, shape (n,)
         Whether a row may have its centre at a sample.
     period : float
     half, exponent : int
     lag : float
-        By how many samples the torque comes late.
+        By how many samples the torques come late.
+    terms : sequence of ndarray, shape (n,)
+        What the factors of terms multiply, by the number of the term.
     """
 
-    angle: Array
-    torque: Array
+    angles: Array
+    torques: Array
     usable: npt.NDArray[np.bool_]
     centres: npt.NDArray[np.bool_]
     period: float
     half: int
     exponent: int
     lag: float = 0.0
+    terms: Sequence[Array] = ()
+
+    @property
+    def samples(self) -> int:
+        """How many samples there are."""
+        return int(self.angles.shape[1])
+
+    @property
+    def equations(self) -> int:
+        """How many equations there are."""
+        return len(self.torques)
 
     @property
     def stride(self) -> int:
-        """Samples from one row to the next."""
+        """Samples from one time of rows to the next."""
         return max(1, self.half // ROWS_A_HALF_WIDTH)
 
     @property
@@ -179,87 +202,93 @@ class ExpandedRecord:
 
     @property
     def rows(self) -> int:
-        """How many rows there are."""
-        return max(0, (self.angle.size - self.length) // self.stride + 1)
+        """How many times of rows there are."""
+        return max(0, (self.samples - self.length) // self.stride + 1)
 
     @property
     def lags(self) -> int:
-        """How many rows share samples, this one counted."""
+        """The rows at how many times share samples, this one counted."""
         return (self.length - 1) // self.stride + 1
 
     @property
     def kernels(self) -> Kernels:
-        """Of the angle."""
+        """Of the angles."""
         return Kernels.of(self.half, self.exponent, self.period)
 
     def late(self) -> tuple[Array, Array]:
-        """Return the torque, moved by whole samples, and the kernel that moves it by the rest."""
+        """Return the torques, moved by whole samples, and the kernel that moves them by the rest."""
         whole = round(self.lag)
-        torque = np.zeros_like(self.torque)
-        if whole >= 0:
-            torque[: self.torque.size - whole] = self.torque[whole:]
-        else:
-            torque[-whole:] = self.torque[:whole]
-        return torque, Kernels.of(self.half, self.exponent, self.period, self.lag - whole).value
+        torques = np.stack([_moved(one, whole) for one in self.torques])
+        return torques, Kernels.of(self.half, self.exponent, self.period, self.lag - whole).value
 
     def usable_rows(self) -> npt.NDArray[np.bool_]:
-        """Return which rows are equations: those that touch no missing sample."""
-        whole = round(self.lag)
-        moved = np.zeros_like(self.usable)
-        if whole >= 0:
-            moved[: self.usable.size - whole] = self.usable[whole:]
-        else:
-            moved[-whole:] = self.usable[:whole]
-        missing = np.concatenate([[0], np.cumsum(~(self.usable & moved))])
-        first = np.arange(self.rows) * self.stride
-        touched = missing[first + self.length] - missing[first]
-        return np.asarray((touched == 0) & self.centres[first + self.half])
+        """Return which rows are equations, shape (rows, equations): those that touch no missing sample."""
+        whole, first = round(self.lag), np.arange(self.rows) * self.stride
+        found = np.empty((self.rows, self.equations), np.bool_)
+        for equation, usable in enumerate(self.usable):
+            missing = np.concatenate([[0], np.cumsum(~(usable & _moved(usable, whole)))])
+            touched = missing[first + self.length] - missing[first]
+            found[:, equation] = (touched == 0) & self.centres[first + self.half]
+        return found
 
-    def moves(self, role: str, noise: float) -> npt.NDArray[np.bool_]:
-        """Return at which samples what a coefficient multiplies is more than noise of this variance, within four windows."""
-        usable, kernel = self.usable_rows(), parts(role, self.kernels)[0]
+    def moves(self, entries: Entries, noise: Sequence[float]) -> npt.NDArray[np.bool_]:
+        """Return at which samples what a coefficient multiplies is more than noise of the angles' variances, within four windows."""
+        usable, kernels = self.usable_rows(), self.kernels
         if not usable.any():
-            return np.ones(self.angle.size, np.bool_)
-        windows = np.lib.stride_tricks.sliding_window_view(self.angle, self.length)[:: self.stride]
-        squares = np.einsum("ij,j->i", windows, kernel) ** 2 * usable
+            return np.ones(self.samples, np.bool_)
+        squares, by_noise = np.zeros((2, self.rows))
+        for equation in sorted({entry[0] for entry in entries}):
+            here = [entry for entry in entries if entry[0] == equation]
+            kernel = parts(here[0][1], kernels)[0]
+            moved = sum(factor * self.angles[channel] for _, _, channel, factor in here)
+            windows = np.lib.stride_tricks.sliding_window_view(moved, self.length)[:: self.stride]
+            squares += np.einsum("ij,j->i", windows, kernel) ** 2 * usable[:, equation]
+            variance = sum(factor**2 * noise[channel] for _, _, channel, factor in here)
+            by_noise += variance * np.sum(kernel**2) * usable[:, equation]
         around = 4 * self.lags
-        sums, counts = (np.concatenate([[0.0], np.cumsum(one)]) for one in (squares, usable))
+        sums, least = (np.concatenate([[0.0], np.cumsum(one)]) for one in (squares, by_noise))
         rows = np.arange(self.rows)
         first, end = np.maximum(rows - around // 2, 0), np.minimum(rows + around // 2 + 1, self.rows)
-        moves = sums[end] - sums[first] >= _MOVES * noise * np.sum(kernel**2) * (counts[end] - counts[first])
-        nearest = np.clip((np.arange(self.angle.size) - self.half + self.stride // 2) // self.stride, 0, self.rows - 1)
+        moves = sums[end] - sums[first] >= _MOVES * (least[end] - least[first])
+        nearest = np.clip((np.arange(self.samples) - self.half + self.stride // 2) // self.stride, 0, self.rows - 1)
         return np.asarray(moves[nearest])
 
     def pieces(self, ahead: int = 0) -> Iterator[tuple[slice, slice]]:
-        """Give pieces of rows and their samples, with some rows ahead of each."""
-        for first in range(0, self.rows, PIECE):
-            begin, end = max(0, first - ahead), min(self.rows, first + PIECE)
+        """Give pieces of the times of rows and their samples, with some times ahead of each."""
+        # Whole blocks of the covariance, which are longer with more equations.
+        count = max(BLOCK, PIECE // self.equations // BLOCK * BLOCK)
+        for first in range(0, self.rows, count):
+            begin, end = max(0, first - ahead), min(self.rows, first + count)
             yield slice(begin, end), slice(begin * self.stride, (end - 1) * self.stride + self.length)
 
     def windows(self, channel: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return the windows of the rows in a stretch of a channel, shape (rows, 2h + 1): a view."""
         return np.lib.stride_tricks.sliding_window_view(channel, self.length)[:: self.stride]
 
-    def columns(self, unknowns: Sequence[ExpandedUnknown], angle: Array, samples: slice) -> Array:
-        """Return the columns of a stretch's rows, shape (rows, columns)."""
-        kernels, windows = self.kernels, self.windows(angle[samples])
-        found = []
-        for one in unknowns:
-            each = windows if one.samples is None else self.windows(one.samples[samples])
-            weights = parts(one.role, kernels)
-            if one.basis is None:
-                found.append((each @ weights[0])[:, np.newaxis])
-                continue
-            blocks = one.basis.blocks(samples)
-            if blocks is not None:
-                found.append(self._sums(each * weights[0], blocks, one.size))
-                continue
-            column = np.zeros((len(each), one.size))
-            for rate, weight in enumerate(weights):
-                functions = one.basis.along(samples, rate)
-                self._add_products(each * weight, functions, column)
-            found.append(column)
-        return np.concatenate(found, axis=1)
+    def columns(self, unknowns: Sequence[ExpandedUnknown], angles: Array, samples: slice) -> Array:
+        """Return the columns of a stretch's rows, shape (rows, equations, columns)."""
+        kernels, windows = self.kernels, [self.windows(one[samples]) for one in angles]
+        found = np.zeros((len(windows[0]), self.equations, sum(one.size for one in unknowns)))
+        for one, place in placed(unknowns):
+            known: dict[tuple[str, int], Array] = {}
+            for equation, role, channel, factor in one.entries:
+                if (role, channel) not in known:
+                    each = windows[channel] if role != "term" else self.windows(self.terms[channel][samples])
+                    known[role, channel] = self._column(one, each, parts(role, kernels), samples)
+                found[:, equation, place] += factor * known[role, channel]
+        return found
+
+    def _column(self, one: ExpandedUnknown, each: Array, weights: Sequence[Array], samples: slice) -> Array:
+        """Return the columns of one unknown by the windows of what it multiplies."""
+        if one.basis is None:
+            return np.asarray((each @ weights[0])[:, np.newaxis])
+        blocks = one.basis.blocks(samples)
+        if blocks is not None:
+            return self._sums(each * weights[0], blocks, one.size)
+        column = np.zeros((len(each), one.size))
+        for rate, weight in enumerate(weights):
+            self._add_products(each * weight, one.basis.along(samples, rate), column)
+        return column
 
     def _sums(self, weighted: Array, blocks: npt.NDArray[np.int64], size: int) -> Array:
         """Return the sums of weighted windows over the samples of every block: the products with functions that are one at a time."""
@@ -278,19 +307,36 @@ class ExpandedRecord:
             windows = self.windows(np.ascontiguousarray(function))[first:last]
             into[first:last, number] += np.einsum("ij,ij->i", weighted[first:last], windows)
 
-    def noise_kernels(self, curves: Sequence[tuple[str, Sequence[Array]]], samples: slice) -> Array:
-        """Return how much each sample's noise of the angle enters every row, shape (rows, 2h + 1).
-
-        Parameters
-        ----------
-        curves : sequence
-            Coefficients: their roles, their values and their derivatives by time at every sample.
-        samples : slice
-        """
+    def noise_kernels(self, curves: Curves, samples: slice) -> dict[tuple[int, int], Array]:
+        """Return how much the noise of each sample of an angle enters the rows of an equation, each of shape (rows, 2h + 1)."""
         kernels = self.kernels
         rows = (samples.stop - samples.start - self.length) // self.stride + 1
-        found = np.zeros((rows, self.length))
-        for role, values in curves:
-            for value, weight in zip(values, parts(role, kernels), strict=False):
-                found += self.windows(value[samples]) * weight
+        found: dict[tuple[int, int], Array] = {}
+        for entries, values in curves:
+            windows = [self.windows(value[samples]) for value in values]
+            for equation, role, channel, factor in entries:
+                if role == "term":
+                    continue
+                entering = found.setdefault((equation, channel), np.zeros((rows, self.length)))
+                for window, weight in zip(windows, parts(role, kernels), strict=False):
+                    entering += window * (factor * weight)
         return found
+
+    def torques_of_terms(self, curves: Curves, samples: slice) -> Array:
+        """Return the torques of terms with these factors at some samples, shape (equations, samples)."""
+        found = np.zeros((self.equations, samples.stop - samples.start))
+        for entries, values in curves:
+            for equation, role, number, factor in entries:
+                if role == "term":
+                    found[equation] += factor * values[0][samples] * self.terms[number][samples]
+        return found
+
+
+def _moved(channel: npt.NDArray[Any], later: int) -> npt.NDArray[Any]:
+    """Return a channel that comes some samples earlier, zero where nothing is left of it."""
+    moved = np.zeros_like(channel)
+    if later >= 0:
+        moved[: channel.size - later] = channel[later:]
+    else:
+        moved[-later:] = channel[:later]
+    return moved

@@ -13,11 +13,12 @@ import numpy.typing as npt
 
 from tvident._expansion.basis import AT_A_TIME, Basis, Coordinate
 from tvident._expansion.families import Family
-from tvident._expansion.fit import Curves, Fitted, Linearised, ScoredSize
+from tvident._expansion.fit import Fitted, Linearised, ScoredSize
 from tvident._expansion.rivals import Rival, Rivals, weights_of
-from tvident._expansion.rows import ExpandedRecord, ExpandedUnknown, placed
+from tvident._expansion.rows import Curves, Entries, ExpandedRecord, ExpandedUnknown, placed
 from tvident._expansion.steps import variance_of_steps
 from tvident._expansion.unseen import Bend, Unseen
+from tvident._expansion.whitened_rows import Noise
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -51,31 +52,30 @@ class RecordPart:
 
     Parameters
     ----------
-    name, role : str
+    name : str
+    entries : Entries
+        Where it appears.
     coordinates : sequence of Coordinate
         None for a constant.
     families : sequence of Family
     sizes : sequence of int or None
         None where the record chooses.
     largest : int
-    samples : ndarray, shape (n,), optional
-        Of a term.
     is_of_time : bool
     """
 
     name: str
-    role: str
+    entries: Entries
     coordinates: Sequence[Coordinate] = ()
     families: Sequence[Family] = ()
     sizes: Sequence[int | None] = ()
     largest: int = 1
-    samples: Array | None = None
     is_of_time: bool = False
 
     def of(self, sizes: Sequence[int]) -> ExpandedUnknown:
         """Return it with sizes."""
         basis = Basis(self.coordinates, self.families, sizes) if self.coordinates else None
-        return ExpandedUnknown(self.name, self.role, basis, self.samples)
+        return ExpandedUnknown(self.name, self.entries, basis)
 
 
 @dataclass(frozen=True)
@@ -103,36 +103,34 @@ class Tried:
 
 @dataclass
 class SizeSearch:
-    """The search for sizes and factors in one record.
+    """The search for sizes and factors in one record, or in several that share them.
 
     Parameters
     ----------
-    record : ExpandedRecord
+    records : sequence of ExpandedRecord
     parts : sequence of RecordPart
-    noise : (float, float)
-        Variances of angle and torque.
+    noise : Noise
+        Variances of every angle and of every torque.
     known : Curves
         Coefficients that are known.
     """
 
-    record: ExpandedRecord
+    records: Sequence[ExpandedRecord]
     parts: Sequence[RecordPart]
-    noise: tuple[float, float]
+    noise: Noise
     known: Curves
     tried: dict[tuple[int, ...], Tried] = field(default_factory=dict)
     rivals: dict[str, Rivals] = field(default_factory=dict)
     _scores: dict[tuple[int, ...], tuple[list[ExpandedUnknown], ScoredSize]] = field(default_factory=dict)
     _bends: dict[str, Bend] = field(default_factory=dict)
 
-    def run(self, curves: Curves, terms: Array) -> tuple[list[ExpandedUnknown], Fitted, Linearised]:
+    def run(self, curves: Curves) -> tuple[list[ExpandedUnknown], Fitted, Linearised]:
         """Return the unknowns with their sizes, their factors, and the rows around them.
 
         Parameters
         ----------
         curves : Curves
-            Coefficients, about, the known ones among them.
-        terms : ndarray, shape (n,)
-            Torque of the further terms, about.
+            All coefficients, about, the known ones among them.
         """
         places = [(part, place) for part, one in enumerate(self.parts) for place in range(len(one.sizes))]
         free = [(part, place) for part, place in places if self.parts[part].sizes[place] is None]
@@ -140,7 +138,7 @@ class SizeSearch:
             [one or self._near(self.parts[part], place) for place, one in enumerate(self.parts[part].sizes)]
             for part in range(len(self.parts))
         ]
-        around = Linearised(self.record, curves, terms, self.noise, self.known)
+        around = Linearised(self.records, curves, self.noise, self.known)
         fitted = self._solved(around, sizes)
         before: list[list[int]] = []
         for _ in range(_ROUNDS):
@@ -257,7 +255,7 @@ class SizeSearch:
 
     @cached_property
     def _unseen(self) -> Unseen:
-        return Unseen(self.record)
+        return Unseen(self.records)
 
     def _look_at(self, sizes: Sequence[Sequence[int]], fitted: Fitted) -> None:
         """Note how curves of time bend where they are seen."""
@@ -280,30 +278,31 @@ class SizeSearch:
         return np.concatenate(found)
 
     def _around(self, sizes: Sequence[Sequence[int]], fitted: Fitted) -> Linearised:
-        curves, terms = curves_of(self._unknowns(sizes), fitted.values, self.record.angle.size)
-        return Linearised(self.record, [*curves, *self.known], terms, self.noise, self.known)
+        samples = max(one.samples for one in self.records)
+        curves = curves_of(self._unknowns(sizes), fitted.values, samples)
+        return Linearised(self.records, [*curves, *self.known], self.noise, self.known)
 
 
 def _key(sizes: Sequence[Sequence[int]]) -> tuple[int, ...]:
     return tuple(size for one in sizes for size in one)
 
 
-def curves_of(unknowns: Sequence[ExpandedUnknown], values: Array, samples: int) -> tuple[Curves, Array]:
-    """Return coefficients with their derivatives, and the torque of further terms, at every sample."""
-    curves: Curves = []
-    terms = np.zeros(samples)
+def curves_of(unknowns: Sequence[ExpandedUnknown], values: Array, samples: int) -> list[tuple[Entries, list[Array]]]:
+    """Return coefficients with their derivatives at every sample."""
+    curves = []
     for one, place in placed(unknowns):
         own = values[place]
         along = [
             np.full(samples, own[0] if rate == 0 else 0.0) if one.basis is None else along_record(one.basis, own, rate)
-            for rate in range(DERIVATIVES.get(one.role, 0) + 1)
+            for rate in range(rates_of(one.entries) + 1)
         ]
-        if one.role == "term":
-            if one.samples is not None:
-                terms += along[0] * one.samples
-        else:
-            curves.append((one.role, along))
-    return curves, terms
+        curves.append((one.entries, along))
+    return curves
+
+
+def rates_of(entries: Entries) -> int:
+    """Return how many derivatives of a coefficient its rows need."""
+    return max((DERIVATIVES.get(role, 0) for _, role, _, _ in entries), default=0)
 
 
 def along_record(basis: Basis, factors: Array, rate: int = 0) -> Array:

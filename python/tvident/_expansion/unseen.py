@@ -7,6 +7,7 @@ be zero with the standard deviation that it has where equations see the curve: a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
@@ -47,34 +48,44 @@ class Bend:
 
 @dataclass(frozen=True)
 class Unseen:
-    """The samples of a record that no equation sees.
+    """The samples of some records that no equation of any of them sees.
 
     Parameters
     ----------
-    record : ExpandedRecord
+    records : sequence of ExpandedRecord
+        With the same test function; their samples are those of the curves.
     """
 
-    record: ExpandedRecord
+    records: Sequence[ExpandedRecord]
+
+    @property
+    def _half(self) -> int:
+        return self.records[0].half
+
+    @cached_property
+    def _samples(self) -> int:
+        return max(one.samples for one in self.records)
 
     @property
     def step(self) -> int:
         """Samples between the values of a difference."""
-        return self.record.stride
+        return self.records[0].stride
 
     @cached_property
     def is_seen(self) -> npt.NDArray[np.bool_]:
         """Whether an equation sees a sample, shape (n,)."""
-        record, reach = self.record, int(_SEEN * self.record.half)
-        centres = np.flatnonzero(record.usable_rows()) * record.stride + record.half
-        change = np.zeros(record.angle.size + 1, np.int64)
-        np.add.at(change, np.maximum(centres - reach, 0), 1)
-        np.add.at(change, np.minimum(centres + reach + 1, record.angle.size), -1)
+        reach = int(_SEEN * self._half)
+        change = np.zeros(self._samples + 1, np.int64)
+        for record in self.records:
+            centres = np.flatnonzero(record.usable_rows().any(axis=1)) * record.stride + record.half
+            np.add.at(change, np.maximum(centres - reach, 0), 1)
+            np.add.at(change, np.minimum(centres + reach + 1, self._samples), -1)
         return np.cumsum(change[:-1]) > 0
 
     @cached_property
     def _is_near(self) -> npt.NDArray[np.bool_]:
         """Whether a sample is near one that is not seen: equations on one side of it alone say little."""
-        reach = int(_NEAR * self.record.half)
+        reach = int(_NEAR * self._half)
         unseen = np.concatenate([[1], ~self.is_seen, [1]])
         count = np.concatenate([[0], np.cumsum(unseen)])
         place = np.arange(1, unseen.size - 1)
@@ -83,7 +94,7 @@ class Unseen:
     @cached_property
     def places(self) -> npt.NDArray[np.intp]:
         """Samples around which differences are taken to be small."""
-        around = np.arange(self.step, self.record.angle.size - self.step, self.step)
+        around = np.arange(self.step, self._samples - self.step, self.step)
         return around[self._is_near[around]]
 
     def bend(self, curve: Array) -> Bend | None:

@@ -57,8 +57,8 @@ class ExpandedTask:
         if not chosen or _determines_nothing(pilot):
             return pilot  # its status says so
         given = ExpandedInputs(self._data, self._request, self._expansions, task, pilot)
-        search = SizeSearch(given.record, given.parts, given.noise, given.known)
-        unknowns, fitted, around = search.run(given.start, given.start_of_terms)
+        search = SizeSearch([given.record], given.parts, given.noise, given.known)
+        unknowns, fitted, around = search.run(given.start)
         tried = sorted(search.tried.values(), key=lambda one: one.parameters)
         outcome = ExpandedOutcome(given, unknowns, fitted, around, tried, search.rivals)
         return self._result(outcome.with_errors_of_residuals())

@@ -12,7 +12,17 @@ import numpy.typing as npt
 from tvident import _core
 from tvident._derivatives import fit_local_polynomials
 from tvident._equation import COEFFICIENTS, parameter
-from tvident._expansion import DERIVATIVES, Coordinate, Curves, ExpandedRecord, Expansion, RecordPart
+from tvident._expansion import (
+    DERIVATIVES,
+    Coordinate,
+    Curves,
+    ExpandedRecord,
+    Expansion,
+    Noise,
+    RecordPart,
+    of_one,
+    rates_of,
+)
 from tvident._identify.data import Data
 from tvident._identify.settings import Request
 from tvident._identify.task import Task
@@ -99,25 +109,29 @@ class ExpandedInputs:
 
     @cached_property
     def record(self) -> ExpandedRecord:
-        """The record as rows are made of it."""
+        """The record as rows are made of it; the last of its terms is that of another zero of the angle."""
         data, settings = self.data, self.pilot.settings
         torque = np.asarray(data.torques, np.float64)
         usable = np.isfinite(self.angle) & np.isfinite(torque)
         for one in self.expansions.values():
             for channel in one.channels:
                 usable &= np.isfinite(channel)
-        for samples in self.terms.values():
+        terms = list(self.terms.values())
+        for samples in terms:
             usable &= np.isfinite(samples)
+        if self.zero:
+            terms.append(-np.nan_to_num(self.pilot.stiffness))
         late = settings.get("lag_samples") or [settings["lag"] / data.period]
         return ExpandedRecord(
-            angle=np.where(usable, self.angle, 0.0),
-            torque=np.where(usable, torque, 0.0),
-            usable=usable,
+            angles=np.where(usable, self.angle, 0.0)[np.newaxis],
+            torques=np.where(usable, torque, 0.0)[np.newaxis],
+            usable=usable[np.newaxis],
             centres=np.ones(usable.shape, bool) if data.mask is None else data.mask,
             period=data.period,
             half=int(settings["window_length"]) // 2,
             exponent=int(settings["exponent"]),
             lag=float(late[0]),
+            terms=[np.where(usable, samples, 0.0) for samples in terms],
         )
 
     @cached_property
@@ -129,24 +143,21 @@ class ExpandedInputs:
     @cached_property
     def parts(self) -> list[RecordPart]:
         """The unknowns, still without sizes."""
-        found = []
+        found, numbers = [], {name: number for number, name in enumerate(self.terms)}
         for name in (*COEFFICIENTS, *self.terms):
             expansion = self.expansions.get(name)
-            samples = self.terms.get(name)
-            filled = None if samples is None else np.where(self.record.usable, samples, 0.0)
+            entries = of_one(role_of(name, expansion), numbers.get(name, 0))
             if expansion is None:
                 if name in self.terms or name not in self.known_values:
-                    found.append(RecordPart(name, role_of(name, None), samples=filled))
+                    found.append(RecordPart(name, entries))
                 continue
-            role, places = role_of(name, expansion), self.coordinates[name]
+            places = self.coordinates[name]
             families = expansion.families_within([one.limits for one in places])
             sizes = expansion.given_sizes
             is_of_time = expansion.is_of_time
-            found.append(
-                RecordPart(name, role, places, families, sizes, expansion.largest, filled, is_of_time=is_of_time)
-            )
+            found.append(RecordPart(name, entries, places, families, sizes, expansion.largest, is_of_time=is_of_time))
         if self.zero:
-            found.append(RecordPart("angle_zero", "term", samples=-np.nan_to_num(self.pilot.stiffness)))
+            found.append(RecordPart("angle_zero", of_one("term", len(self.terms))))
         return found
 
     @cached_property
@@ -163,19 +174,19 @@ class ExpandedInputs:
     @property
     def known(self) -> Curves:
         """The same with their rates, as rows take them."""
-        found: Curves = []
+        found = []
         for name, value in self.known_values.items():
             along = [np.asarray(value)]
             for _ in range(DERIVATIVES.get(name, 0)):
                 along.append(np.gradient(along[-1], self.data.period) if np.ptp(value) else np.zeros(value.shape))
             if np.any(value):
-                found.append((name, along))
+                found.append((of_one(name), along))
         return found
 
     @property
     def start(self) -> Curves:
         """The coefficients as windows have them; without their slopes, which are noise."""
-        found: Curves = []
+        found = []
         for name in COEFFICIENTS:
             if name in self.known_values:
                 continue
@@ -183,23 +194,17 @@ class ExpandedInputs:
             there = np.isfinite(value)
             middle = float(np.median(value[there])) if there.any() else 0.0
             level = np.where(there, value, middle) if name == "stiffness" else np.full(value.shape, middle)
-            slopes = [np.zeros(value.shape)] * DERIVATIVES.get(role_of(name, self.expansions.get(name)), 0)
-            found.append((role_of(name, self.expansions.get(name)), [level, *slopes]))
+            entries = of_one(role_of(name, self.expansions.get(name)))
+            found.append((entries, [level, *[np.zeros(value.shape)] * rates_of(entries)]))
+        terms = [(of_one("term", number), [self.pilot.terms[name]]) for number, name in enumerate(self.terms)]
+        found += [(entries, [np.nan_to_num(values)]) for entries, (values,) in terms]
         return [*found, *self.known]
 
-    @property
-    def start_of_terms(self) -> Array:
-        """Torque of the further terms as windows have it."""
-        total = np.zeros(self.data.time.size)
-        for name, samples in self.terms.items():
-            total += np.nan_to_num(self.pilot.terms[name]) * np.where(self.record.usable, samples, 0.0)
-        return total
-
     @cached_property
-    def noise(self) -> tuple[float, float]:
+    def noise(self) -> Noise:
         """Variances of the noise of angle and torque."""
         (angle,) = _core.noise(self.data.angles, self.request.quantisation)
         shown = self.pilot.settings.get("shown_noise")
         torque = float(shown[0]) if shown else _core.noise(self.data.torques)[0].sigma ** 2
-        least = float(np.mean(self.record.torque**2)) * _QUIET**2
-        return angle.sigma**2, max(torque, least) or 1.0
+        least = float(np.mean(self.record.torques**2)) * _QUIET**2
+        return [angle.sigma**2], [max(torque, least) or 1.0]

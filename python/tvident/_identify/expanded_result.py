@@ -86,7 +86,7 @@ class ExpandedOutcome:
         as_they_are = self.fitted.condition
         if not _core.HARDLY_TOLD_APART < as_they_are < np.inf:
             return as_they_are
-        return min(as_they_are, condition_of_curves(self.unknowns, self.fitted.root, self.given.record.usable))
+        return min(as_they_are, condition_of_curves(self.unknowns, self.fitted.root, self.given.record.usable[0]))
 
     def with_errors_of_residuals(self) -> ExpandedOutcome:
         """Return the same with errors that know of residuals larger than the noise, and of their correlation."""
@@ -250,7 +250,7 @@ class ExpandedOutcome:
 
     def _status(self, values: dict[str, Array], errors: dict[str, Array], step: slice) -> npt.NDArray[np.uint16]:
         """Return the flags of samples, and make values without an error none."""
-        status = np.where(self.given.record.usable[step], np.uint16(0), np.uint16(Status.GAP)).astype(np.uint16)
+        status = np.where(self.given.record.usable[0, step], np.uint16(0), np.uint16(Status.GAP)).astype(np.uint16)
         for name, expansion in self.given.expansions.items():
             for channel in expansion.channels:
                 values[name] = np.where(np.isfinite(channel[step]), values[name], np.nan)
@@ -273,10 +273,10 @@ class ExpandedOutcome:
             if one.basis is None:
                 continue
             moves, reach = np.ones(found.shape, np.bool_), np.ones(found.shape)
-            if one.role != "term":
-                moving = self.given.record.moves(one.role, self.given.noise[0])
+            if one.entries[0][1] != "term":
+                moving = self.given.record.moves(one.entries, self.given.noise[0])
                 if not moving.all():
-                    moves, reach = moving[step], reach_over(one.basis, moving & self.given.record.usable)[step]
+                    moves, reach = moving[step], reach_over(one.basis, moving & self.given.record.usable[0])[step]
             dark = of_windows | ~moves
             value, error = values[one.name], errors[one.name]
             known = ~dark & np.isfinite(value)

@@ -1,0 +1,121 @@
+"""Rows of one record around some curves: whitened by the covariance of their noise, with regressors that are free of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from tvident._expansion.covariance import Whitening
+from tvident._expansion.rows import Curves, ExpandedRecord, ExpandedUnknown
+
+Array: TypeAlias = npt.NDArray[np.float64]
+
+Noise: TypeAlias = tuple[Sequence[float], Sequence[float]]
+"""Variances of the noise of every angle and of every torque."""
+
+
+class WhitenedRows:
+    """Rows of a record around some curves: what noise they have, and their regressors without it.
+
+    Parameters
+    ----------
+    record : ExpandedRecord
+    curves : Curves
+        All coefficients, about.
+    noise : Noise
+    known : Curves
+        Those of the curves that are known beforehand.
+    """
+
+    def __init__(self, record: ExpandedRecord, curves: Curves, noise: Noise, known: Curves) -> None:
+        self.record = record
+        self._curves, self._noise = curves, noise
+        usable = record.usable_rows()
+        self._torques, self._late = record.late()
+        band, left, rhs = self._band_and_residuals()
+        left[~usable] = 0.0
+        self._usable = usable
+        self.residuals = left[usable]
+        self._whitening = Whitening(band, usable.ravel(), record.equations)
+        self.observations = float(usable.sum()) * self._whitening.worth
+        shown = self._shown(self._whitening.solve(left.ravel()).reshape(left.shape))
+        self._rhs = self._without_noise(rhs, shown, known)
+        self._rhs[~usable] = 0.0
+        self._angles = record.angles - shown
+
+    def whitened(self, unknowns: Sequence[ExpandedUnknown]) -> Iterator[Array]:
+        """Give pieces of whitened rows, the right-hand side last."""
+        record, before = self.record, None
+        for some, samples in record.pieces():
+            columns = record.columns(unknowns, self._angles, samples)
+            design = np.concatenate([columns, self._rhs[some, :, np.newaxis]], axis=2)
+            design[~self._usable[some]] = 0.0
+            rows = design.reshape(-1, design.shape[2])
+            white, before = self._whitening.whiten(rows, some.start * record.equations, before)
+            yield white
+
+    def _band_and_residuals(self) -> tuple[Array, Array, Array]:
+        """Return the covariance of rows by how far they are apart, what is left of each, and the right-hand sides."""
+        record, count = self.record, self.record.equations
+        left, rhs = np.zeros((2, record.rows, count))
+        band = np.zeros((record.rows * count, record.lags * count))
+        for some, samples in record.pieces(record.lags - 1):
+            entering = record.noise_kernels(self._curves, samples)
+            rhs[some] = np.stack([record.windows(one[samples]) @ self._late for one in self._torques], axis=1)
+            left[some] = rhs[some] - self._motion(entering, record.angles[:, samples])
+            torques = record.torques_of_terms(self._curves, samples)
+            left[some] -= np.stack([record.windows(one) @ record.kernels.value for one in torques], axis=1)
+            for lag in range(min(record.lags, some.stop - some.start)):
+                self._add_covariance(band, some, lag, entering)
+        return band, left, rhs
+
+    def _add_covariance(self, band: Array, some: slice, lag: int, entering: dict[tuple[int, int], Array]) -> None:
+        """Note the covariance of rows of a piece that are some times apart."""
+        record, count = self.record, self.record.equations
+        angles, torques = self._noise
+        apart, rows = lag * record.stride, some.stop - some.start - lag
+        white = float(self._late[: record.length - apart] @ self._late[apart:])
+        for equation in range(count):
+            places = slice((some.start + lag) * count + equation, some.stop * count, count)
+            for other in range(equation + 1 if lag == 0 else count):
+                shared = np.full(rows, torques[equation] * white if equation == other else 0.0)
+                for channel, variance in enumerate(angles):
+                    one, two = entering.get((equation, channel)), entering.get((other, channel))
+                    if one is not None and two is not None and variance:
+                        both = np.einsum("ij,ij->i", one[lag:, : record.length - apart], two[:rows, apart:])
+                        shared += variance * both
+                band[places, lag * count + equation - other] = shared
+
+    def _motion(self, entering: dict[tuple[int, int], Array], angles: Array) -> Array:
+        """Return what the motion of some angles makes of a piece's rows, shape (rows, equations)."""
+        rows = (angles.shape[1] - self.record.length) // self.record.stride + 1
+        found = np.zeros((rows, self.record.equations))
+        for (equation, channel), kernels in entering.items():
+            found[:, equation] += np.einsum("ij,ij->i", kernels, self.record.windows(angles[channel]))
+        return found
+
+    def _shown(self, weights: Array) -> Array:
+        """Return the noise of the angles that the residuals show."""
+        record, shown = self.record, np.zeros(self.record.angles.shape)
+        for some, samples in record.pieces():
+            count = some.stop - some.start
+            for (equation, channel), kernels in record.noise_kernels(self._curves, samples).items():
+                weighted, piece = kernels * weights[some, equation, np.newaxis], shown[channel, samples]
+                for place in range(record.length):
+                    piece[place : place + (count - 1) * record.stride + 1 : record.stride] += weighted[:, place]
+        return np.asarray(-np.asarray(self._noise[0])[:, np.newaxis] * shown)
+
+    def _without_noise(self, rhs: Array, shown: Array, known: Curves) -> Array:
+        """Return the right-hand sides without the noise that is shown, and without what is known."""
+        record, found = self.record, rhs.copy()
+        for some, samples in record.pieces():
+            found[some] -= self._motion(record.noise_kernels(self._curves, samples), shown[:, samples])
+            if known:
+                angles = record.angles[:, samples] - shown[:, samples]
+                found[some] -= self._motion(record.noise_kernels(known, samples), angles)
+                torques = record.torques_of_terms(known, samples)
+                found[some] -= np.stack([record.windows(one) @ record.kernels.value for one in torques], axis=1)
+        return found
