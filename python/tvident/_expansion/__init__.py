@@ -1,15 +1,16 @@
 """Expands parameters in functions of time or of a recorded channel: families, sizes by a criterion, weighted rows in weak form."""
 
 from tvident._expansion.basis import Basis, Coordinate
+from tvident._expansion.coordinates import Rates, check_expansion, part_of, refuse
 from tvident._expansion.expansion import Expansion
 from tvident._expansion.families import family_from, plain_family
 from tvident._expansion.fit import Fitted, Linearised
 from tvident._expansion.rivals import Rival, Rivals
 from tvident._expansion.rows import (
     Curves,
-    Entries,
     ExpandedRecord,
     ExpandedUnknown,
+    Places,
     condition_of_curves,
     of_one,
     placed,
@@ -35,27 +36,31 @@ __all__ = [
     "Basis",
     "Coordinate",
     "Curves",
-    "Entries",
     "ExpandedRecord",
     "ExpandedUnknown",
     "Expansion",
     "Fitted",
     "Linearised",
     "Noise",
+    "Places",
+    "Rates",
     "RecordPart",
     "Rival",
     "Rivals",
     "SizeSearch",
     "Tried",
     "along_record",
+    "check_expansion",
     "condition_of_curves",
     "curve_along",
     "curves_of",
     "family_from",
     "of_one",
+    "part_of",
     "placed",
     "plain_family",
     "rates_of",
     "reach_over",
+    "refuse",
     "variance_of_steps",
 ]

@@ -26,11 +26,11 @@ _MOVES = 4.0
 PIECE = 4096
 """Rows that are in memory at a time: whole blocks of the covariance's factor."""
 
-Entries: TypeAlias = Sequence[tuple[int, str, int, float]]
+Places: TypeAlias = Sequence[tuple[int, str, int, float]]
 """Where an unknown appears: equation, role, channel of the motion or number of the term, factor. The role is ``"inertia"``, ``"momentum"``,
 ``"damping"``, ``"stiffness"`` or ``"term"``."""
 
-Curves: TypeAlias = Sequence[tuple[Entries, Sequence[Array]]]
+Curves: TypeAlias = Sequence[tuple[Places, Sequence[Array]]]
 """Coefficients: where they appear, their values and their derivatives by time at the samples."""
 
 
@@ -70,13 +70,13 @@ class ExpandedUnknown:
     Parameters
     ----------
     name : str
-    entries : Entries
+    entries : Places
     basis : Basis, optional
         None for a constant.
     """
 
     name: str
-    entries: Entries
+    entries: Places
     basis: Basis | None = None
 
     @property
@@ -144,7 +144,7 @@ def parts(role: str, kernels: Kernels) -> list[Array]:
     return [kernels.value]
 
 
-def of_one(role: str, number: int = 0) -> Entries:
+def of_one(role: str, number: int = 0) -> Places:
     """Return where an unknown of one equation of one angle appears; terms have a number."""
     return ((0, role, number, 1.0),)
 
@@ -231,7 +231,7 @@ class ExpandedRecord:
             found[:, equation] = (touched == 0) & self.centres[first + self.half]
         return found
 
-    def moves(self, entries: Entries, noise: Sequence[float]) -> npt.NDArray[np.bool_]:
+    def moves(self, entries: Places, noise: Sequence[float]) -> npt.NDArray[np.bool_]:
         """Return at which samples what a coefficient multiplies is more than noise of the angles' variances, within four windows."""
         usable, kernels = self.usable_rows(), self.kernels
         if not usable.any():

@@ -15,7 +15,7 @@ from tvident._expansion.basis import AT_A_TIME, Basis, Coordinate
 from tvident._expansion.families import Family
 from tvident._expansion.fit import Fitted, Linearised, ScoredSize
 from tvident._expansion.rivals import Rival, Rivals, weights_of
-from tvident._expansion.rows import Curves, Entries, ExpandedRecord, ExpandedUnknown, placed
+from tvident._expansion.rows import Curves, ExpandedRecord, ExpandedUnknown, Places, placed
 from tvident._expansion.steps import variance_of_steps
 from tvident._expansion.unseen import Bend, Unseen
 from tvident._expansion.whitened_rows import Noise
@@ -53,7 +53,7 @@ class RecordPart:
     Parameters
     ----------
     name : str
-    entries : Entries
+    entries : Places
         Where it appears.
     coordinates : sequence of Coordinate
         None for a constant.
@@ -65,7 +65,7 @@ class RecordPart:
     """
 
     name: str
-    entries: Entries
+    entries: Places
     coordinates: Sequence[Coordinate] = ()
     families: Sequence[Family] = ()
     sizes: Sequence[int | None] = ()
@@ -287,7 +287,7 @@ def _key(sizes: Sequence[Sequence[int]]) -> tuple[int, ...]:
     return tuple(size for one in sizes for size in one)
 
 
-def curves_of(unknowns: Sequence[ExpandedUnknown], values: Array, samples: int) -> list[tuple[Entries, list[Array]]]:
+def curves_of(unknowns: Sequence[ExpandedUnknown], values: Array, samples: int) -> list[tuple[Places, list[Array]]]:
     """Return coefficients with their derivatives at every sample."""
     curves = []
     for one, place in placed(unknowns):
@@ -300,7 +300,7 @@ def curves_of(unknowns: Sequence[ExpandedUnknown], values: Array, samples: int) 
     return curves
 
 
-def rates_of(entries: Entries) -> int:
+def rates_of(entries: Places) -> int:
     """Return how many derivatives of a coefficient its rows need."""
     return max((DERIVATIVES.get(role, 0) for _, role, _, _ in entries), default=0)
 

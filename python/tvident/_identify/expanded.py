@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NoReturn
 
 import numpy as np
 import numpy.typing as npt
@@ -12,14 +11,14 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident._advice import FoundExpansion, untold, words_of_expansions
 from tvident._equation import Term, has_kind
-from tvident._expansion import DERIVATIVES, Expansion, SizeSearch
+from tvident._expansion import Expansion, SizeSearch, check_expansion, of_one, refuse
 from tvident._identify.data import Data
 from tvident._identify.expanded_inputs import ExpandedInputs, role_of
 from tvident._identify.expanded_result import ExpandedOutcome
 from tvident._identify.methods import WeakForm
 from tvident._identify.settings import Request, plain
 from tvident._identify.task import Task
-from tvident._results import ExpandedParameter, Identification, Recorded
+from tvident._results import ExpandedFit, ExpandedParameter, Identification, Recorded
 from tvident._status import Status, untold_samples
 
 
@@ -58,13 +57,13 @@ class ExpandedTask:
             return pilot  # its status says so
         given = ExpandedInputs(self._data, self._request, self._expansions, task, pilot)
         search = SizeSearch([given.record], given.parts, given.noise, given.known)
-        unknowns, fitted, around = search.run(given.start)
-        tried = sorted(search.tried.values(), key=lambda one: one.parameters)
-        outcome = ExpandedOutcome(given, unknowns, fitted, around, tried, search.rivals)
-        return self._result(outcome.with_errors_of_residuals())
+        found = search.run(given.start)
+        fit = ExpandedFit(search, self._expansions, self._data.units, *found)
+        return self._result(ExpandedOutcome(given, fit.with_errors_of_residuals()))
 
     def _result(self, outcome: ExpandedOutcome) -> Identification:
-        data, pilot, curves = self._data, outcome.given.pilot, outcome.curves
+        data, pilot, fit = self._data, outcome.given.pilot, outcome.fit
+        curves = fit.curves
         found = outcome.estimates()
         told = [
             FoundExpansion(
@@ -92,11 +91,11 @@ class ExpandedTask:
         ]
         words = words_of_expansions(
             told,
-            outcome.fitted.observations,
-            outcome.ratio,
+            fit.fitted.observations,
+            fit.ratio,
             changing,
             doubted=bool(outcome.doubts_of_windows),
-            determined=bool(np.isfinite(outcome.fitted.condition)),
+            determined=bool(np.isfinite(fit.fitted.condition)),
         )
         dark = untold(untold_samples(found.status), list(curves), data.period * data.step)
         if data.labels is not None:
@@ -143,23 +142,23 @@ class ExpandedTask:
         """Refuse what an expansion cannot stand beside."""
         data = self._data
         if data.batch:
-            _refuse("an Expansion is for one record at a time", f"shape {data.angles.shape}", "identify each in turn")
+            refuse("an Expansion is for one record at a time", f"shape {data.angles.shape}", "identify each in turn")
         if not isinstance(self._request.form, WeakForm):
-            _refuse("an Expansion needs the weak form", "the strong form", "leave method= out, or give a WeakForm")
+            refuse("an Expansion needs the weak form", "the strong form", "leave method= out, or give a WeakForm")
         if data.instruments is not None:
-            _refuse("an Expansion has no instruments", "instrument=", "leave one of them out")
+            refuse("an Expansion has no instruments", "instrument=", "leave one of them out")
         if data.motion.recorded:
             channels = " and ".join(data.motion.recorded)
-            _refuse("an Expansion needs the angle alone", channels, "leave the other channels out")
+            refuse("an Expansion needs the angle alone", channels, "leave the other channels out")
         self._check_others()
         for name, one in self._expansions.items():
-            self._check_functions(name, one)
+            check_expansion(name, of_one(role_of(name, one)), one, data.time.size)
 
     def _check_others(self) -> None:
         """Refuse windows beside an expansion."""
         for name, one in self._request.parameters.items():
             if isinstance(one, str) and one in {"windowed", "varying"}:
-                _refuse(
+                refuse(
                     f"beside an Expansion of {next(iter(self._expansions))} all others are constant, known or expansions",
                     f"{name}={one!r}",
                     f"say {name}='constant', or give an Expansion of time",
@@ -167,27 +166,9 @@ class ExpandedTask:
         for term in self._request.terms:
             if isinstance(term, tuple | list) and arguments.is_word(term[1], "windowed"):
                 called = getattr(term[0], "name", term[0])
-                _refuse(
+                refuse(
                     "beside an Expansion terms are constant or expansions", f"{called!r} windowed", "make it constant"
                 )
-
-    def _check_functions(self, name: str, one: Expansion) -> None:
-        """Refuse functions that have not the derivatives that rows need, and channels of another length."""
-        # The second derivative of an inertia may jump.
-        needed = min(DERIVATIVES.get(role_of(name, one), 0), 1)
-        if needed and any(family.smooth < needed for family in one.families):
-            _refuse(f"{name} needs functions with continuous derivatives", one.called, "use 'bspline'")
-        for channel in one.channels:
-            if channel.shape != self._data.time.shape:
-                _refuse(
-                    "the channel of an Expansion must have a value for every sample",
-                    f"shape {channel.shape} for {self._data.time.size} samples",
-                    "resample it",
-                )
-
-
-def _refuse(rule: str, got: str, cure: str) -> NoReturn:
-    raise ValueError(f"{rule}; got {got}; {cure}")
 
 
 def with_expansions(request: Request, expansions: Mapping[str, Expansion]) -> Request:

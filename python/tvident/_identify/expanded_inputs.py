@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,13 +14,13 @@ from tvident._derivatives import fit_local_polynomials
 from tvident._equation import COEFFICIENTS, parameter
 from tvident._expansion import (
     DERIVATIVES,
-    Coordinate,
     Curves,
     ExpandedRecord,
     Expansion,
     Noise,
     RecordPart,
     of_one,
+    part_of,
     rates_of,
 )
 from tvident._identify.data import Data
@@ -74,40 +74,6 @@ class ExpandedInputs:
         return float(zero[0] if isinstance(zero, list) else zero)
 
     @cached_property
-    def coordinates(self) -> dict[str, list[Coordinate]]:
-        """What every expansion is a function of."""
-        return {name: self.coordinates_of(name, one) for name, one in self.expansions.items()}
-
-    def coordinates_of(self, name: str, expansion: Expansion) -> list[Coordinate]:
-        """Return what an expansion is a function of, scaled, with its rates where the equation needs them."""
-        data, derivatives = self.data, DERIVATIVES.get(role_of(name, expansion), 0)
-        found = []
-        each: Sequence[Array] = expansion.channels or [data.time]
-        for channel, given in zip(each, expansion.given_limits, strict=True):
-            there = np.isfinite(channel)
-            low, high = given or (float(channel[there].min()), float(channel[there].max())) if there.any() else (0, 0)
-            if not low < high:
-                raise ValueError(
-                    f"the channel of an Expansion must change; {name} got one that stays at {low:g}; "
-                    f"say {name}='constant'"
-                )
-            outside = there & ((channel < low) | (channel > high))
-            if outside.any():
-                raise ValueError(
-                    f"limits must hold every value of the channel; got {low:g} to {high:g} for {channel[there].min():g} "
-                    f"to {channel[there].max():g}; widen them"
-                )
-            places = np.where(there, (channel - low) / (high - low), 0.0)
-            rates = np.broadcast_to(np.zeros((2, 1)), (2, channel.size))
-            if expansion.is_of_time:
-                rates = np.broadcast_to(np.array([[1 / (high - low)], [0.0]]), (2, channel.size))
-            elif derivatives:
-                smooth = fit_local_polynomials(np.where(there, channel, np.nan), "auto", delta=data.period)
-                rates = np.nan_to_num(np.stack([smooth.derivatives[1], smooth.derivatives[2]]) / (high - low))
-            found.append(Coordinate(places, rates, (low, high)))
-        return found
-
-    @cached_property
     def record(self) -> ExpandedRecord:
         """The record as rows are made of it; the last of its terms is that of another zero of the angle."""
         data, settings = self.data, self.pilot.settings
@@ -151,14 +117,14 @@ class ExpandedInputs:
                 if name in self.terms or name not in self.known_values:
                     found.append(RecordPart(name, entries))
                 continue
-            places = self.coordinates[name]
-            families = expansion.families_within([one.limits for one in places])
-            sizes = expansion.given_sizes
-            is_of_time = expansion.is_of_time
-            found.append(RecordPart(name, entries, places, families, sizes, expansion.largest, is_of_time=is_of_time))
+            found.append(part_of(name, entries, expansion, self.data.time, self._rates))
         if self.zero:
             found.append(RecordPart("angle_zero", of_one("term", len(self.terms))))
         return found
+
+    def _rates(self, channel: Array) -> tuple[Array, Array]:
+        smooth = fit_local_polynomials(channel, "auto", delta=self.data.period)
+        return smooth.derivatives[1], smooth.derivatives[2]
 
     @cached_property
     def known_values(self) -> dict[str, Array]:

@@ -2,33 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import combinations
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from tvident import _core
 from tvident._equation import COEFFICIENTS
-from tvident._expansion import (
-    ExpandedUnknown,
-    Fitted,
-    Linearised,
-    Rivals,
-    Tried,
-    along_record,
-    condition_of_curves,
-    curve_along,
-    placed,
-    reach_over,
-)
 from tvident._identify.expanded_inputs import ExpandedInputs
-from tvident._results import Estimates, ExpandedParameter, of_powers
-from tvident._status import Status, untold_samples
-from tvident._units import unit_said
+from tvident._results import Estimates, ExpandedFit
+from tvident._status import Status
 
 Array = npt.NDArray[np.float64]
 
@@ -37,12 +20,6 @@ _JUMPS = 2.0
 
 _FOLLOWED = 0.5
 """Of a jump, by which an expansion must change within the test function to follow it."""
-
-_HARDLY_KNOWN = 0.1
-"""Error, as a part of what a parameter usually is, from which on nothing is known of it where windows know nothing."""
-
-_FAR_LESS_KNOWN = 10.0
-"""Error over what it usually is, from which on nothing is known where it is larger than the parameter usually is, too."""
 
 _DOUBTS = Status.KIND_CONTRADICTED | Status.SCALES_DISAGREE
 """Flags of windows that hold for smooth functions of time, too."""
@@ -53,86 +30,16 @@ _KEPT = Status.COLOURED | Status.CHANNEL_SUSPECTED
 
 @dataclass(frozen=True)
 class ExpandedOutcome:
-    """What a fit found.
+    """What a fit found of one record.
 
     Parameters
     ----------
     given : ExpandedInputs
-    unknowns : sequence of ExpandedUnknown
-    fitted : Fitted
-    around : Linearised
-        The rows around what was found.
-    tried : sequence of Tried
-    rivals : mapping of str to Rivals
-        Curves of other sizes.
+    fit : ExpandedFit
     """
 
     given: ExpandedInputs
-    unknowns: Sequence[ExpandedUnknown]
-    fitted: Fitted
-    around: Linearised
-    tried: Sequence[Tried]
-    rivals: Mapping[str, Rivals]
-
-    @property
-    def ratio(self) -> float:
-        """The mean square of the residuals over that of the noise."""
-        free = self.fitted.observations - sum(one.size for one in self.unknowns)
-        return self.fitted.misfit / free if free > 0 else float("nan")
-
-    @cached_property
-    def condition(self) -> float:
-        """The condition number of the equations, in the better of two bases: the functions as they are, or orthonormal ones."""
-        as_they_are = self.fitted.condition
-        if not _core.HARDLY_TOLD_APART < as_they_are < np.inf:
-            return as_they_are
-        return min(as_they_are, condition_of_curves(self.unknowns, self.fitted.root, self.given.record.usable[0]))
-
-    def with_errors_of_residuals(self) -> ExpandedOutcome:
-        """Return the same with errors that know of residuals larger than the noise, and of their correlation."""
-        if not self.ratio > 1:
-            return self
-        root = (
-            self.around.root_of_residuals(self.unknowns, self.fitted)
-            if self.ratio > _core.NOISE_MODEL_FAILS
-            else self.fitted.root * np.sqrt(self.ratio)
-        )
-        return replace(self, fitted=replace(self.fitted, root=root))
-
-    @cached_property
-    def curves(self) -> dict[str, ExpandedParameter]:
-        """Every expansion as a curve."""
-        found = {}
-        for one, place in placed(self.unknowns):
-            if one.basis is None:
-                continue
-            expansion = self.given.expansions[one.name]
-            own, root = self.fitted.values[place], self.fitted.root[place]
-            covariance = np.asarray(root @ root.T)
-            sizes = [each.sizes[one.name] for each in self.tried]
-            limits = tuple(each.limits for each in one.basis.coordinates)
-            shown = of_powers(own, covariance) if expansion.is_of_powers else (own, covariance)
-            found[one.name] = ExpandedParameter(
-                name=one.name,
-                family=expansion.called,
-                coefficients=shown[0],
-                covariance=shown[1],
-                sizes={
-                    "size": np.array([each[0] if len(each) == 1 else each for each in sizes]),
-                    "criterion": np.array([each.criterion for each in self.tried]),
-                    "residual": np.array([each.residual for each in self.tried]),
-                    "parameters": np.array([each.parameters for each in self.tried]),
-                    "weight": np.array([each.weight for each in self.tried]),
-                },
-                limits=limits[0] if len(limits) == 1 else limits,
-                unit=self.given.data.units.get(one.name, ""),
-                unit_of="s" if expansion.is_of_time else unit_said(expansion.of),
-                _basis=one.basis,
-                _own=own,
-                _own_root=root,
-                _rivals=self.rivals.get(one.name, Rivals()),
-            )
-        return found
+    fit: ExpandedFit
 
     def estimates(self) -> Estimates:
         """Return values and errors at the samples."""
@@ -141,14 +48,12 @@ class ExpandedOutcome:
         values: dict[str, Array] = {}
         errors: dict[str, Array] = {}
         constants: dict[str, tuple[Any, Any]] = {}
-        for one, place in placed(self.unknowns):
-            own, root = self.fitted.values[place], self.fitted.root[place]
+        for one, value, error in self.fit.values_and_errors(step):
             if one.basis is None:
-                constants[one.name] = (float(own[0]), float(np.linalg.norm(root[0])))
+                constants[one.name] = (float(value[0]), float(error[0]))
                 values[one.name], errors[one.name] = (np.full(count, number) for number in constants[one.name])
             else:
-                along = curve_along(one.basis, own, root, self.rivals.get(one.name, Rivals()))
-                values[one.name], errors[one.name] = (each[step] for each in along)
+                values[one.name], errors[one.name] = value, error
         if "angle_zero" in constants:
             moved, error = constants["angle_zero"]
             constants["angle_zero"] = (given.zero + moved, error)
@@ -160,20 +65,20 @@ class ExpandedOutcome:
         for name in given.pilot.settings["inner"]:
             constants[name], kinds[name] = given.pilot.constants[name], np.array("constant")
             values[name], errors[name] = (np.full(count, number) for number in constants[name])
-        left = self.around.residuals
+        left = self.fit.around.residuals
         return replace(
             given.pilot._found,  # noqa: SLF001 - parts of this package
             values=values,
             errors=errors,
             factors={},
-            covariances=self._covariances(),
+            covariances=self._covariances(step),
             constants=constants,
-            condition=np.full(count, self.condition),
+            condition=np.full(count, self.fit.condition),
             residual_std=np.full(count, float(np.std(left)) if left.size else np.nan),
             order=np.zeros(count, np.uint8),
-            status=self._status(values, errors, step),
+            status=self.fit.without_untold(values, errors, given.pilot.status, step),
             record_status=self._record_status(),
-            expansions=self.curves,
+            expansions=self.fit.curves,
             kinds=kinds,
         )
 
@@ -182,7 +87,8 @@ class ExpandedOutcome:
         before = dict(self.given.pilot.settings)
         kinds = {**dict.fromkeys(COEFFICIENTS, "known"), **self._kinds()}
         sizes = {
-            name: {"family": one.family, "size": one.size, "limits": one.limits} for name, one in self.curves.items()
+            name: {"family": one.family, "size": one.size, "limits": one.limits}
+            for name, one in self.fit.curves.items()
         }
         return {
             **before,
@@ -244,72 +150,16 @@ class ExpandedOutcome:
     def _kinds(self) -> dict[str, str]:
         return {
             one.name: "constant" if one.basis is None else "expanded"
-            for one in self.unknowns
+            for one in self.fit.unknowns
             if one.name != "angle_zero"
         }
-
-    def _status(self, values: dict[str, Array], errors: dict[str, Array], step: slice) -> npt.NDArray[np.uint16]:
-        """Return the flags of samples, and make values without an error none."""
-        status = np.where(self.given.record.usable[0, step], np.uint16(0), np.uint16(Status.GAP)).astype(np.uint16)
-        for name, expansion in self.given.expansions.items():
-            for channel in expansion.channels:
-                values[name] = np.where(np.isfinite(channel[step]), values[name], np.nan)
-        for name, value in values.items():
-            missing = ~(np.isfinite(value) & np.isfinite(errors[name]))
-            values[name], errors[name] = np.where(missing, np.nan, value), np.where(missing, np.nan, errors[name])
-            status[missing] |= np.uint16(Status.INVALID)
-        status[self._untold(values, errors, step)] |= np.uint16(Status.ILL_CONDITIONED)
-        return status
-
-    def _untold(self, values: Mapping[str, Array], errors: Mapping[str, Array], step: slice) -> npt.NDArray[np.bool_]:
-        """Return where the motion tells nothing of what is expanded, and no function reaches over it.
-
-        Windows in its place know nothing there, or what it multiplies is noise. That noise would make errors small, and an inertia zero:
-        errors are at least those that the motion elsewhere leaves.
-        """
-        of_windows = untold_samples(self.given.pilot.status[step])
-        found: npt.NDArray[np.bool_] = np.zeros(of_windows.shape, np.bool_)
-        for one in self.unknowns:
-            if one.basis is None:
-                continue
-            moves, reach = np.ones(found.shape, np.bool_), np.ones(found.shape)
-            if one.entries[0][1] != "term":
-                moving = self.given.record.moves(one.entries, self.given.noise[0])
-                if not moving.all():
-                    moves, reach = moving[step], reach_over(one.basis, moving & self.given.record.usable[0])[step]
-            dark = of_windows | ~moves
-            value, error = values[one.name], errors[one.name]
-            known = ~dark & np.isfinite(value)
-            if known.any():
-                usual, known_to = np.median(np.abs(value[known])), np.median(error[known])
-                least = np.where(moves, error, np.maximum(error, known_to * reach))
-                found |= least > np.where(dark, _HARDLY_KNOWN * usual, max(usual, _FAR_LESS_KNOWN * known_to))
-        return found
 
     def _record_status(self) -> Status:
         flags = Status(int(np.asarray(self.given.pilot.record_status))) & _KEPT
         if self.given.data.doubts:
             flags |= Status.CHANNEL_SUSPECTED
-        if not np.isfinite(self.condition):
-            flags |= Status.RANK_DEFICIENT
-        elif self.condition > _core.HARDLY_TOLD_APART:
-            flags |= Status.ILL_CONDITIONED
-        if self.ratio > _core.NOISE_MODEL_FAILS:
-            flags |= Status.NOISE_MODEL
-        return flags
+        return flags | self.fit.flags
 
-    def _covariances(self) -> dict[frozenset[str], Array]:
-        """Return covariances of pairs of coefficients at every sample."""
-        step = slice(None, None, self.given.data.step)
-        samples = self.given.data.time.size
-        coefficients = [(one, place) for one, place in placed(self.unknowns) if one.name in COEFFICIENTS]
-        found = {}
-        for (one, rows), (other, columns) in combinations(coefficients, 2):
-            block = self.fitted.covariance[rows, columns]
-            total = np.zeros(samples)
-            for number, row in enumerate(block):
-                before = 1.0 if one.basis is None else along_record(one.basis, np.eye(len(block))[number])
-                after = float(row[0]) if other.basis is None else along_record(other.basis, row)
-                total += before * after
-            found[frozenset((one.name, other.name))] = total[step]
-        return found
+    def _covariances(self, step: slice) -> dict[frozenset[str], Array]:
+        """Return covariances of pairs of coefficients at the samples that are wanted."""
+        return {frozenset(pair): values[step] for pair, values in self.fit.covariances(COEFFICIENTS).items()}

@@ -2,6 +2,7 @@
 
 from tvident._results.curve import ExpandedParameter, of_powers
 from tvident._results.estimates import Estimates
+from tvident._results.expanded_fit import ExpandedFit
 from tvident._results.explained import explained_steps
 from tvident._results.held_back import parts_of, where_held_back
 from tvident._results.loaded import from_file, list_from_file
@@ -43,6 +44,7 @@ __all__ = [
     "TRIED",
     "UNTOLD_LAG",
     "Estimates",
+    "ExpandedFit",
     "ExpandedParameter",
     "Identification",
     "IdentifiedRecords",
