@@ -251,7 +251,6 @@ def test_trials_of_several_lengths_are_aligned_on_their_phase() -> None:
         ({"phase": np.ones((3, 400))}, "grow"),
         ({"phase": np.ones((3, 300))}, "sample for every sample"),
         ({"phase": np.tile(np.linspace(0, 2 * np.pi, 400), (3, 1))}, "divide it by its period"),
-        ({"stiffness": tvident.Expansion("bspline")}, "an Expansion, which is not supported"),
         ({"lag": "auto"}, "not supported"),
         ({"instrument": np.ones((3, 400))}, "not supported"),
         ({"method": "paper"}, "WeakForm"),

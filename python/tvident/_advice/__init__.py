@@ -3,7 +3,7 @@
 from tvident._advice.channels import held, spoilt
 from tvident._advice.collinear import NOT_DISTINGUISHED
 from tvident._advice.events import events_that_stay, untold, without_numbers
-from tvident._advice.expansion import FoundExpansion, words_of_expansions
+from tvident._advice.expansion import FoundExpansion, found_expansion, words_of_expansions
 from tvident._advice.gains import changes_of_gain
 from tvident._advice.instrument import fed_back_in_records, words_with_instrument
 from tvident._advice.plausible import Plausible
@@ -22,6 +22,7 @@ __all__ = [
     "changes_of_gain",
     "events_that_stay",
     "fed_back_in_records",
+    "found_expansion",
     "held",
     "spoilt",
     "untold",

@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._arguments import listed
-from tvident._results import Words
+from tvident._expansion import Expansion
+from tvident._results import ExpandedParameter, WindowsBeside, Words
 
 _DIFFERS = 2.0
 """Windows contradict a schedule where the mean squared difference, over its variance, is above this and chance."""
@@ -104,6 +105,39 @@ class FoundExpansion:
             ]
         agree = f"{self.name}: the expansion and {count} windows agree: they differ by {ratio:.2g} standard errors rms"
         return [f"{agree}, beside the jump" if jumps else agree], jumps
+
+
+def found_expansion(
+    curve: ExpandedParameter,
+    expansion: Expansion,
+    windows: WindowsBeside | None,
+    found: tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]],
+    time: npt.NDArray[np.float64],
+) -> FoundExpansion:
+    """Return what was found of an expanded parameter, beside windows in its place.
+
+    Parameters
+    ----------
+    curve : ExpandedParameter
+    expansion : Expansion
+        As it was asked for.
+    windows : WindowsBeside, optional
+    found : (ndarray, ndarray), each of shape (n,)
+        Values and errors of the parameter.
+    time : ndarray, shape (n,)
+        Seconds.
+    """
+    return FoundExpansion(
+        curve.name,
+        curve.family,
+        curve.size,
+        curve.sizes,
+        expansion.largest,
+        is_of_time=expansion.is_of_time,
+        chosen=None in expansion.given_sizes,
+        against_windows=(float("nan"), 0) if windows is None else windows.differ(*found),
+        missed_jumps=() if windows is None else [float(time[at]) for at in windows.missed_jumps(found[0])],
+    )
 
 
 def words_of_expansions(

@@ -47,7 +47,8 @@ class Expansion:
         is the mean over those that explain the record nearly as well.
     of : array_like, shape (n,), or a pair of them, optional
         The recorded channel that the parameter is a function of, such as a position; by default time. Of two channels: all products of
-        the functions of each. Its noise counts as part of the curve. Equations that touch a missing value are left out.
+        the functions of each. Its noise counts as part of the curve. Trials share it. Equations that touch a missing value are left
+        out.
     limits : (float, float), or a pair of them, optional
         The range of the channel that functions live on, in its unit; by default from its smallest value to its largest. For
         ``"fourier"`` limits that are given are a period: one turn of an angle. By default the period is half as long again as the

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -15,6 +16,10 @@ Array: TypeAlias = npt.NDArray[np.float64]
 
 Noise: TypeAlias = tuple[Sequence[float], Sequence[float]]
 """Variances of the noise of every angle and of every torque."""
+
+
+_AT_ONCE, _KEPT = 1 << 22, 1 << 24
+"""Numbers of the whitened columns that are in memory at once, and of those that are kept: 32 and 128 MiB."""
 
 
 class WhitenedRows:
@@ -33,6 +38,7 @@ class WhitenedRows:
     def __init__(self, record: ExpandedRecord, curves: Curves, noise: Noise, known: Curves) -> None:
         self.record = record
         self._curves, self._noise = curves, noise
+        self._kept: dict[tuple[str, tuple[int, ...] | None], Array] = {}
         usable = record.usable_rows()
         self._torques, self._late = record.late()
         band, left, rhs = self._band_and_residuals()
@@ -48,10 +54,38 @@ class WhitenedRows:
 
     def whitened(self, unknowns: Sequence[ExpandedUnknown]) -> Iterator[Array]:
         """Give pieces of whitened rows, the right-hand side last."""
+        numbers = self._usable.size * sum(one.size for one in unknowns)
+        if not self._usable.size:
+            return
+        if numbers <= _AT_ONCE:
+            yield np.concatenate([*(self._kept_columns(one) for one in unknowns), self._white_rhs], axis=1)
+        else:
+            yield from self._pieces(lambda samples: self._columns(unknowns, samples), self._rhs[:, :, np.newaxis])
+
+    def _kept_columns(self, one: ExpandedUnknown) -> Array:
+        """Return the whitened columns of one unknown, which are kept: searches for a size ask for those of all others again and again."""
+        key = one.name, None if one.basis is None else tuple(one.basis.sizes)
+        if key not in self._kept:
+            found = list(self._pieces(lambda samples: self._columns([one], samples), None))
+            if sum(kept.size for kept in self._kept.values()) > _KEPT:
+                self._kept.clear()
+            self._kept[key] = np.concatenate(found)
+        return self._kept[key]
+
+    @cached_property
+    def _white_rhs(self) -> Array:
+        return self._whitening.whiten(self._rhs.reshape(-1, 1))[0]
+
+    def _columns(self, unknowns: Sequence[ExpandedUnknown], samples: slice) -> Array:
+        return self.record.columns(unknowns, self._angles, samples)
+
+    def _pieces(self, columns: Callable[[slice], Array], beside: Array | None) -> Iterator[Array]:
+        """Give pieces of whitened columns of the samples of a piece, and of columns beside them, shape (rows, equations, columns)."""
         record, before = self.record, None
         for some, samples in record.pieces():
-            columns = record.columns(unknowns, self._angles, samples)
-            design = np.concatenate([columns, self._rhs[some, :, np.newaxis]], axis=2)
+            design = columns(samples)
+            if beside is not None:
+                design = np.concatenate([design, beside[some]], axis=2)
             design[~self._usable[some]] = 0.0
             rows = design.reshape(-1, design.shape[2])
             white, before = self._whitening.whiten(rows, some.start * record.equations, before)

@@ -206,7 +206,8 @@ def identify(
         KIND_CONTRADICTED in ``record_status`` says that records differ more than their errors explain (Cochran's test, 1 in 1000).
     dof_axis : int, optional
         The axis of the masses, 0: angle and torque have shape (masses, n), and M q̈ + C q̇ + K q + terms = f is identified. Every entry of
-        the matrices is ``"auto"``, unless a parameter is a kind, nested lists of kinds and numbers, or a :class:`Matrix`. A row of the
+        the matrices is ``"auto"``, unless a parameter is a kind, an :class:`Expansion`, nested lists of these and numbers, or a
+        :class:`Matrix`. A row of the
         torque that is NaN was not measured; one that is zero says that no force acts. Returns a :class:`MergedIdentification`.
     structure : Chain or Mechanism, optional
         Springs and dampers between masses, or bodies whose equations follow from their energies, in place of full matrices.

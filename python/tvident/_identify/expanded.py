@@ -9,12 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._advice import FoundExpansion, untold, words_of_expansions
-from tvident._equation import Term, has_kind
+from tvident._advice import found_expansion, untold, words_of_expansions
+from tvident._equation import has_kind
 from tvident._expansion import Expansion, SizeSearch, check_expansion, of_one, refuse
 from tvident._identify.data import Data
 from tvident._identify.expanded_inputs import ExpandedInputs, role_of
 from tvident._identify.expanded_result import ExpandedOutcome
+from tvident._identify.expanded_terms import expansions_of_terms, in_windows
 from tvident._identify.methods import WeakForm
 from tvident._identify.settings import Request, plain
 from tvident._identify.task import Task
@@ -25,11 +26,7 @@ from tvident._status import Status, untold_samples
 def expansions_of(request: Request) -> dict[str, Expansion]:
     """Return the expansions that are asked for, by the names of parameters and terms."""
     found = {name: one for name, one in request.parameters.items() if isinstance(one, Expansion)}
-    terms = request.terms if isinstance(request.terms, tuple | list) else ()
-    for term in terms:
-        if has_kind(term) and isinstance(term[1], Expansion):
-            found[term[0].name if isinstance(term[0], Term) else str(term[0])] = term[1]
-    return found
+    return found | expansions_of_terms(request.terms)
 
 
 class ExpandedTask:
@@ -65,20 +62,14 @@ class ExpandedTask:
         data, pilot, fit = self._data, outcome.given.pilot, outcome.fit
         curves = fit.curves
         found = outcome.estimates()
-        told = [
-            FoundExpansion(
-                one.name,
-                one.family,
-                one.size,
-                one.sizes,
-                self._expansions[one.name].largest,
-                is_of_time=self._expansions[one.name].is_of_time,
-                chosen=None in self._expansions[one.name].given_sizes,
-                against_windows=outcome.against_windows(one.name, found),
-                missed_jumps=outcome.missed_jumps(one.name, found),
+        told = []
+        for name, one in curves.items():
+            windows = outcome.windows(name)
+            told.append(
+                found_expansion(
+                    one, self._expansions[name], windows, (found.values[name], found.errors[name]), data.time
+                )
             )
-            for one in curves.values()
-        ]
         doubts = outcome.doubts_of_windows
         if any(one.is_contradicted for one in told):
             doubts |= Status.KIND_CONTRADICTED
@@ -130,12 +121,10 @@ class ExpandedTask:
             name: ("windowed" if name == "stiffness" else "auto") if isinstance(one, Expansion) else one
             for name, one in given.items()
         }
-        terms = [
-            (term[0], "windowed") if has_kind(term) and isinstance(term[1], Expansion) else term
-            for term in self._request.terms
-        ]
         # Without a windowed parameter terms without a kind are constant, as they are beside an expansion.
-        terms = [term if isinstance(term, tuple | list) else (term, "constant") for term in terms]
+        terms = [
+            term if isinstance(term, tuple | list) else (term, "constant") for term in in_windows(self._request.terms)
+        ]
         return replace(self._request, parameters=windows, terms=terms)
 
     def _check(self) -> None:

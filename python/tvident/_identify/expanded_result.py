@@ -10,16 +10,10 @@ import numpy.typing as npt
 
 from tvident._equation import COEFFICIENTS
 from tvident._identify.expanded_inputs import ExpandedInputs
-from tvident._results import Estimates, ExpandedFit
+from tvident._results import Estimates, ExpandedFit, WindowsBeside
 from tvident._status import Status
 
 Array = npt.NDArray[np.float64]
-
-_JUMPS = 2.0
-"""Standard errors that a jump of windows must be large for an expansion to have to follow it."""
-
-_FOLLOWED = 0.5
-"""Of a jump, by which an expansion must change within the test function to follow it."""
 
 _DOUBTS = Status.KIND_CONTRADICTED | Status.SCALES_DISAGREE
 """Flags of windows that hold for smooth functions of time, too."""
@@ -100,20 +94,21 @@ class ExpandedOutcome:
             "chosen": [one for one in before["chosen"] if one != "regression_window"],
         }
 
-    def against_windows(self, name: str, found: Estimates) -> tuple[float, int]:
-        """Return the mean squared difference from windows over its variance, and at how many windows, which hardly share equations."""
+    def windows(self, name: str) -> WindowsBeside | None:
+        """Return windows in the place of an expansion; None where there are none at its samples."""
         pilot = self.given.pilot
         if str(pilot.settings["kinds"].get(name)) != "windowed" or self.given.data.step > 1:
-            return float("nan"), 0
-        rows = int(pilot.settings["regression_window"]) + int(pilot.settings["window_length"])
-        apart = slice(rows // 2, None, max(1, rows))
-        value = getattr(pilot, name) if name in COEFFICIENTS else pilot.terms[name]
-        there = pilot.trusted[apart] & np.isfinite(found.values[name][apart])
-        if not there.any():
-            return float("nan"), 0
-        variance = pilot.stderr[name][apart] ** 2 + found.errors[name][apart] ** 2
-        squares = ((value[apart] - found.values[name][apart]) ** 2 / variance)[there]
-        return float(np.mean(squares)), int(there.sum())
+            return None
+        length = int(pilot.settings["window_length"])
+        return WindowsBeside(
+            getattr(pilot, name) if name in COEFFICIENTS else pilot.terms[name],
+            pilot.stderr[name],
+            pilot.trusted,
+            int(pilot.settings["regression_window"]) + length,
+            length // 2,
+            # The first sample after each.
+            [int(np.searchsorted(pilot.time, jump)) for jump in pilot.jumps],
+        )
 
     @property
     def doubts_of_windows(self) -> Status:
@@ -124,28 +119,6 @@ class ExpandedOutcome:
         if not all(one.is_of_time for one in self.given.expansions.values()):
             return Status(0)
         return Status(int(np.asarray(self.given.pilot.record_status))) & _DOUBTS
-
-    def missed_jumps(self, name: str, found: Estimates) -> tuple[float, ...]:
-        """Return the seconds at which windows jump and the expansion does not, within the test function that sees both."""
-        pilot = self.given.pilot
-        if str(pilot.settings["kinds"].get(name)) != "windowed" or self.given.data.step > 1:
-            return ()
-        half = int(pilot.settings["window_length"]) // 2
-        windows, errors = getattr(pilot, name) if name in COEFFICIENTS else pilot.terms[name], pilot.stderr[name]
-        missed = []
-        for jump in pilot.jumps:
-            # The first sample after it.
-            at = int(np.searchsorted(pilot.time, jump))
-            before, after = max(at - half, 0), min(at + half, pilot.time.size - 1)
-            if not 0 < at < pilot.time.size:
-                continue
-            # Beside it few equations are left, since no test function may reach over it.
-            size = windows[after] - windows[before]
-            known = abs(size) > _JUMPS * np.hypot(errors[after], errors[before])
-            follows = (found.values[name][after] - found.values[name][before]) / size
-            if known and not follows > _FOLLOWED:
-                missed.append(float(jump))
-        return tuple(missed)
 
     def _kinds(self) -> dict[str, str]:
         return {

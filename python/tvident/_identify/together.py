@@ -15,6 +15,7 @@ from tvident._derivatives import plan
 from tvident._equation import LINEAR_UNITS, OFFSET, UNITS, Unknown, all_terms
 from tvident._identify.columns import WINDOW_OF_TERMS, Columns
 from tvident._identify.earlier import check_no_own_terms
+from tvident._identify.expanded_terms import expansions_of_terms, in_windows
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, WeakForm, exponent_of
 from tvident._units import (
     ROTARY,
@@ -31,6 +32,7 @@ from tvident._units import (
 )
 
 if TYPE_CHECKING:
+    from tvident._expansion import Expansion
     from tvident._merged import Earlier, Masses, MergedIdentification, Sampling, Trials
 
 Numbers = npt.NDArray[np.number]
@@ -273,16 +275,19 @@ def _channels(trials: Trials | None, masses: Sequence[Masses]) -> tuple[Sequence
     return [one for of in masses for one in of.angles], torques
 
 
-def _terms(given: Any, earlier: Earlier | None) -> tuple[list[Unknown], list[tuple[str, str | None]]]:
+def _terms(given: Any, earlier: Earlier | None) -> tuple[list[Unknown], list[tuple[str, str | Expansion | None]]]:
     """Return terms, and their names and kinds; no kind where an earlier result tells it."""
     if given is None and earlier is not None:
         check_no_own_terms(earlier.own_terms, earlier.terms)
         given = earlier.terms
-    terms = all_terms(((OFFSET, "constant"),) if given is None else given, "constant")
+    pairs = ((OFFSET, "constant"),) if given is None else given
+    functions = expansions_of_terms(pairs)
+    terms = all_terms(in_windows(pairs), "constant")
     if earlier is None:
-        return terms, [(one.name, one.kind) for one in terms]
+        return terms, [(one.name, functions.get(one.name, one.kind)) for one in terms]
     said = [isinstance(one, tuple | list) for one in given]
-    return terms, [(one.name, one.kind if told else None) for one, told in zip(terms, said, strict=True)]
+    kinds = [functions.get(one.name, one.kind) if told else None for one, told in zip(terms, said, strict=True)]
+    return terms, [(one.name, kind) for one, kind in zip(terms, kinds, strict=True)]
 
 
 def _sampling(options: Options, axis: Axis, angles: Sequence[Numbers], torques: Sequence[Numbers]) -> Sampling:

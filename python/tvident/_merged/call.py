@@ -13,8 +13,10 @@ import numpy.typing as npt
 from tvident import _core
 from tvident._clocks import Timed
 from tvident._equation import COEFFICIENTS, Term
+from tvident._expansion import Expansion
 from tvident._merged.earlier import Earlier
-from tvident._merged.elements import Element, kind_or_number
+from tvident._merged.elements import Element, check_expansions, kind_or_number, on_grid
+from tvident._merged.expanded import ExpandedEquations
 from tvident._merged.merging import Merging, Part
 from tvident._merged.predicted import Equations
 from tvident._merged.recorded import MergedRecorded
@@ -45,7 +47,7 @@ class AskedTogether:
         When samples were taken.
     parameters : mapping of str to object
         What was given of inertia, damping and stiffness.
-    terms : sequence of (str, str or None)
+    terms : sequence of (str, str, Expansion or None)
         Names and kinds; none where an earlier result tells it.
     own : mapping of str to Term
         Those of the user's own.
@@ -64,7 +66,7 @@ class AskedTogether:
 
     sampling: Sampling
     parameters: Mapping[str, Any]
-    terms: Sequence[tuple[str, str | None]]
+    terms: Sequence[tuple[str, str | Expansion | None]]
     own: Mapping[str, Term]
     forms: Sequence[Mapping[str, int | None]]
     earlier: Earlier | None
@@ -87,6 +89,9 @@ class AskedTogether:
         The place is that of the part among those that share no unknown. Noise that may not be white is asked for its colour first, as the
         core reads that with the variance alone.
         """
+        if equations.expansions:
+            windows = replace(self, step=1).part(equations.in_windows, samples, noise, place, is_white=is_white)
+            return self._expanded(windows, equations)
         asked = self.forms[min(place, len(self.forms) - 1)]
         identified = partial(
             _core.identify_merged,
@@ -116,6 +121,19 @@ class AskedTogether:
         same = noise or (None if max(found.colours, default=1.0) > 1 else found.noise)
         return Part(found, equations, lambda others: again.part(others, samples, same), chosen)
 
+    def _expanded(self, windows: Part, equations: Equations) -> Part:
+        """Return what takes the place of windows where elements are sums of functions; windows themselves where they determine nothing."""
+        assert isinstance(windows.found, _core.MergedIdentification)  # noqa: S101 - for mypy
+        time = self.sampling.times(windows.found.status.size)
+        units = self.units_of(equations.elements)
+        each = ExpandedEquations(equations, windows.found, self.sampling.period, time, self.step, units)
+        found = each.found()
+        if found is None:
+            return windows
+        chosen = [one for one in windows.chosen if one != "regression_window"]
+        fixed = equations.of_sizes({name: curve.size for name, curve in found.curves.items()})
+        return Part(found, fixed, lambda others: self._expanded(windows.again(others.in_windows), others), chosen)
+
     @staticmethod
     def _check_window(wanted: int | None, nearest: int) -> None:
         """Refuse a regression window that is far from the nearest that there is, in samples; 0 where nothing is windowed."""
@@ -143,6 +161,11 @@ class AskedTogether:
         said = {name for name, kind in self.terms if kind is not None}
         return self.earlier.as_before(elements, frozenset(self.parameters) | said | given)
 
+    @property
+    def kinds_of_terms(self) -> dict[str, str]:
+        """Kinds of the terms that were given one."""
+        return {name: kind for name, kind in self.terms if isinstance(kind, str)}
+
     def units_of(self, elements: Sequence[Element]) -> dict[str, str]:
         """Return the units of everything by name."""
         return {**self.units, **{element.name: self.units.get(element.of, "") for element in elements}}
@@ -158,7 +181,9 @@ def identify_trials(trials: Trials, asked: AskedTogether, term_values: TermValue
         elements.append(Element(name, name, ((0, coefficient, 0, 1.0),), value))
     for place, (name, kind) in enumerate(asked.terms):
         elements.append(Element(name, name, ((0, None, place, 1.0),), kind_or_number(name, kind or "constant")))
-    elements = asked.as_before(elements)
+    elements = [on_grid(one, asked.sampling) for one in asked.as_before(elements)]
+    beside = {"weights": trials.weights is not None, "phase": trials.phase is not None}
+    check_expansions(elements, trials.samples, beside)
     if all(element.is_known for element in elements):
         raise ValueError("at least one parameter must be unknown; all are given; use 'windowed' or 'constant' for one")
     given = []
@@ -190,6 +215,6 @@ def identify_trials(trials: Trials, asked: AskedTogether, term_values: TermValue
             own=asked.own,
         ),
         terms=[name for name, _ in asked.terms],
-        kinds_of_terms={name: kind for name, kind in asked.terms if kind is not None},
+        kinds_of_terms=asked.kinds_of_terms,
     )
     return MergedIdentification(merging)

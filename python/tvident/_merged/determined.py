@@ -62,7 +62,9 @@ def undetermined(part: Part, period: float) -> dict[str, str]:
         Seconds from one sample to the next.
     """
     kinds = {part.names[one.element]: one.kind for one in part.found.elements}
-    windowed, constant = ([name for name, kind in kinds.items() if kind == of] for of in ("windowed", "constant"))
+    windowed = [name for name, kind in kinds.items() if kind == "windowed"]
+    # A sum of functions may be a constant.
+    constant = [name for name, kind in kinds.items() if kind != "windowed"]
     names = [*windowed, *constant]
     rows, noises = _rows(part, names, period)
     length = part.found.regression_window if windowed else rows[0].shape[1] if rows else 0
@@ -117,7 +119,7 @@ def _rows(part: Part, names: list[str], period: float) -> tuple[list[Array], Arr
             if of is not None:
                 enters[one.name][equation, channel, of] += factor
     values = {part.names[one.element]: _median(one.values) for one in found.elements}
-    values |= {one.name: float(one.value) for one in equations.elements if one.is_known}
+    values |= {one.name: one.number for one in equations.elements if one.is_known}
     mixed = sum(
         (value * enters[name] for name, value in values.items() if np.isfinite(value)), np.zeros((count, channels, 3))
     )

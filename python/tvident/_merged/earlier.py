@@ -9,15 +9,14 @@ from typing import Any
 
 from tvident import _arguments as arguments
 from tvident._clocks import SETTINGS_OF_TIMES
-from tvident._equation import Kind
 from tvident._merged.elements import Element, kind_or_number
 from tvident._merged.merging import Merging
 
 _LENGTHS = ("window_length", "exponent", "regression_window")
 _OTHERS = ("form", "sample_rate", "trials", "masses", "kinds", "known", "terms", "own_terms", "chosen", "step")
-_FOUND = ("noise", "prediction_error", *SETTINGS_OF_TIMES)
+_FOUND = ("noise", "prediction_error", "expansions", *SETTINGS_OF_TIMES)
 """Found, not chosen: nothing of it is used again."""
-_UNKNOWN = "unknown"
+_UNKNOWN, _EXPANDED = "unknown", "expanded"
 
 
 @dataclass(frozen=True)
@@ -27,7 +26,7 @@ class Earlier:
     Parameters
     ----------
     values : mapping of str to str or float
-        By element: its kind, or what was known of it. Those that could not be known are left out.
+        By element: its kind, "expanded" among them, or what was known of it. Those that could not be known are left out.
     terms : sequence of str
         Names of the terms that elements belong to.
     own_terms : sequence of str
@@ -36,7 +35,7 @@ class Earlier:
         Lengths of every part of the equations that shares no unknown with others; None where they are chosen again.
     """
 
-    values: Mapping[str, Kind | float]
+    values: Mapping[str, Any]
     terms: Sequence[str]
     own_terms: Sequence[str]
     forms: Sequence[Mapping[str, int | None]]
@@ -64,9 +63,11 @@ class Earlier:
         if not {*_LENGTHS, *_OTHERS} <= set(settings) <= {*_LENGTHS, *_OTHERS, *_FOUND}:
             raise KeyError
         known = {str(name): _number(value) for name, value in settings["known"].items()}
-        values: dict[str, Kind | float] = {}
+        values: dict[str, Any] = {}
         for name, kind in settings["kinds"].items():
-            if kind != _UNKNOWN:
+            if kind == _EXPANDED:
+                values[str(name)] = _EXPANDED
+            elif kind != _UNKNOWN:
                 values[str(name)] = known[name] if kind == "known" else kind_or_number(str(name), str(kind))
         lengths = {name: [_length(one) for one in settings[name]] for name in _LENGTHS}
         # Where windows of all lengths are averaged, which of them predicts best is a matter of the record.
@@ -99,10 +100,17 @@ class Earlier:
                 f"settings must be of a result with the same elements; got {foreign[0]!r}, which there is not here; give the same "
                 "structure and terms"
             )
-        return [
-            replace(one, value=self.values[one.name]) if one in rest and one.name in self.values else one
-            for one in elements
-        ]
+        names = {one.name for one in rest}
+        return [self._before(one) if one.name in names & set(self.values) else one for one in elements]
+
+    def _before(self, element: Element) -> Element:
+        """Return an element as it was found; its functions must be given again."""
+        value = self.values[element.name]
+        if value == _EXPANDED:
+            raise ValueError(
+                f"settings hold no functions, and {element.name} is an expansion; got none; pass its Expansion(…) again"
+            )
+        return replace(element, value=value)
 
     def check_parts(self, parts: int) -> None:
         """Refuse settings of equations that fell into another number of parts."""
@@ -117,7 +125,7 @@ def stored(merging: Merging, kinds: Mapping[str, str]) -> dict[str, Any]:
     """Return what settings keep beside lengths, so that they can be given to another call."""
     return {
         "kinds": dict(kinds),
-        "known": {one.name: float(one.value) for one in merging.elements if not isinstance(one.value, str)},
+        "known": {one.name: one.number for one in merging.elements if one.is_known},
         "terms": list(merging.terms),
         "own_terms": [] if merging.recorded is None else list(merging.recorded.own),
         "chosen": list(merging.parts[0].chosen) if merging.parts else [],

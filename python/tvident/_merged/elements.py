@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._equation import COEFFICIENTS, Kind, parameter
-from tvident._expansion import Expansion
+from tvident._expansion import Expansion, Places, check_expansion, refuse
+from tvident._merged.sampling import Sampling
 
 Entry = tuple[int, int | None, int, float]
 """Equation, coefficient of the motion (0 inertia, 1 damping, 2 stiffness; None for a term), channel or term, factor."""
@@ -28,19 +29,47 @@ class Element:
         Inertia, damping, stiffness, or the name of a term.
     entries : tuple of Entry
         Where it appears.
-    value : str or float
-        A kind of unknown, or what is known.
+    value : str, float or Expansion
+        A kind of unknown, what is known, or the functions of which it is a sum.
     """
 
     name: str
     of: str
     entries: tuple[Entry, ...]
-    value: Kind | float
+    value: Kind | float | Expansion
 
     @property
     def is_known(self) -> bool:
         """Whether it is a number already."""
-        return not isinstance(self.value, str)
+        return not isinstance(self.value, str | Expansion)
+
+    @property
+    def number(self) -> float:
+        """What is known of it; NaN where nothing is."""
+        return float("nan") if isinstance(self.value, str | Expansion) else float(self.value)
+
+    @property
+    def expansion(self) -> Expansion | None:
+        """The functions of which it is a sum, if it is."""
+        return self.value if isinstance(self.value, Expansion) else None
+
+    @property
+    def places(self) -> Places:
+        """Where it appears, as rows of expansions have it."""
+        momentum = self.expansion is not None and self.expansion.inertia_times == "momentum"
+        roles = ("momentum" if momentum else "inertia", *COEFFICIENTS[1:])
+        return [
+            (equation, "term" if of is None else roles[of], channel, factor)
+            for equation, of, channel, factor in self.entries
+        ]
+
+    @property
+    def in_windows(self) -> Element:
+        """The element with windows, or what the record decides, in the place of functions."""
+        if self.expansion is None:
+            return self
+        # Those of terms and of stiffness may change where a test sees nothing of it yet.
+        return replace(self, value="auto" if self.of in COEFFICIENTS[:2] else "windowed")
 
     @property
     def equations(self) -> frozenset[int]:
@@ -57,10 +86,19 @@ class Element:
         """Return the element as the core takes it."""
         if isinstance(self.value, str):
             return list(self.entries), None, self.value
-        return list(self.entries), float(self.value), "constant"
+        return list(self.entries), self.number, "constant"
 
 
-def kind_or_number(name: str, value: object) -> Kind | float:
+def on_grid(element: Element, sampling: Sampling) -> Element:
+    """Return an element whose functions are of channels on a uniform grid."""
+    one = element.expansion
+    if one is None or not one.channels or sampling.clock is None:
+        return element
+    channels = tuple(map(sampling.known, one.channels))
+    return replace(element, value=replace(one, of=channels if len(channels) > 1 else channels[0]))
+
+
+def kind_or_number(name: str, value: object) -> Kind | float | Expansion:
     """Return how one element comes about; None is as if nothing were said of it.
 
     Raises
@@ -69,15 +107,12 @@ def kind_or_number(name: str, value: object) -> Kind | float:
         If it is an array, or varies slowly, which merged rows cannot follow yet.
     """
     if isinstance(value, Expansion):
-        raise ValueError(  # noqa: TRY004 - it is right beside one record
-            f"{name} must be 'windowed', 'constant', 'auto' or a number beside ensemble_axis= and dof_axis=; got an Expansion, which is "
-            "not supported there yet; use 'windowed', or identify one trial of one mass"
-        )
+        return value
     found = parameter(name, "auto" if value is None else value, ())
     if found == "varying":
         raise ValueError(
-            f"{name} must be 'windowed', 'constant', 'auto' or a number beside ensemble_axis= and dof_axis=; got 'varying', which is not "
-            "supported there yet; use 'windowed'"
+            f"{name} must be 'windowed', 'constant', 'auto', a number or an Expansion beside ensemble_axis= and dof_axis=; got 'varying', "
+            "which is not supported there yet; use 'windowed', or a smooth function of time: tvident.Expansion('bspline')"
         )
     if isinstance(found, np.ndarray):
         raise ValueError(  # noqa: TRY004 - arrays are known parameters elsewhere
@@ -85,6 +120,46 @@ def kind_or_number(name: str, value: object) -> Kind | float:
             "yet; take its part of the torque off the torque"
         )
     return found
+
+
+def check_expansions(elements: Sequence[Element], samples: int, beside: Mapping[str, bool]) -> None:
+    """Refuse windows beside sums of functions, functions that rows cannot use, and channels of another length.
+
+    Parameters
+    ----------
+    elements : sequence of Element
+    samples : int
+        Of the result.
+    beside : mapping of str to bool
+        Options beside which there are no sums of functions yet, and whether they are given.
+
+    Raises
+    ------
+    ValueError
+        If there are any.
+    """
+    expanded = [one for one in elements if one.expansion is not None]
+    given = [name for name, is_given in beside.items() if is_given and expanded]
+    if given:
+        refuse(
+            f"an Expansion of {expanded[0].name} needs trials as they are", f"{given[0]}= beside it", _WITHOUT[given[0]]
+        )
+    for one in expanded:
+        if one.expansion is not None:
+            check_expansion(one.name, one.places, one.expansion, samples)
+    windowed = [one.name for one in elements if one.value == "windowed"] if expanded else []
+    if windowed:
+        refuse(
+            f"beside an Expansion of {expanded[0].name} all others are constant, known or expansions",
+            f"{windowed[0]}='windowed'",
+            f"say {windowed[0]}='constant', or give an Expansion of time",
+        )
+
+
+_WITHOUT = {
+    "weights": "leave them out, leave samples out by mask=, or use 'windowed'",
+    "phase": "cut trials to the same length, or use 'windowed'",
+}
 
 
 def unmentioned(name: str, given: Mapping[Any, object], known: Sequence[Any]) -> None:

@@ -132,7 +132,10 @@ def _held(samples: int, window_length: int) -> list[tuple[int, int]]:
 def _values_without(part: Part, held: Sequence[Sequence[tuple[int, int]]], merging: Merging) -> dict[str, Array]:
     """Return the elements, found without what is held back, at every sample of the result."""
     kinds: dict[str, Any] = {part.names[one.element]: one.kind for one in part.found.elements}
-    elements = [one if one.is_known else replace(one, value=kinds[one.name]) for one in part.equations.elements]
+    elements = [
+        one if one.is_known or one.expansion is not None else replace(one, value=kinds[one.name])
+        for one in part.equations.elements
+    ]
     trials = []
     for (angles, *rest), ends in zip(part.equations.trials, held, strict=True):
         there = np.array(angles, np.float64)
@@ -140,9 +143,7 @@ def _values_without(part: Part, held: Sequence[Sequence[tuple[int, int]]], mergi
             there[:, first:end] = np.nan
         trials.append((there, *rest))
     found = part.again(Equations(elements, part.equations.numbers, trials))
-    values = {
-        one.name: np.full(merging.samples, float(one.value)) for one in elements if not isinstance(one.value, str)
-    }
+    values = {one.name: np.full(merging.samples, one.number) for one in elements if one.is_known}
     size = found.found.status.size
     beside = found.found.status & int(Status.GAP | Status.EDGE) != 0
     for one in found.found.elements:

@@ -17,7 +17,7 @@ from tvident._merged.merging import Identifiable, Merging
 from tvident._merged.result import MergedIdentification
 from tvident._merged.sampling import Sampling
 from tvident._merged.stored import FORMAT, KIND, OWN, entries_of
-from tvident._results import KIND_OF_LISTS, from_file, list_from_file, scan_from, words_from
+from tvident._results import KIND_OF_LISTS, curves_from, from_file, list_from_file, scan_from, words_from
 from tvident._status import Status
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -124,6 +124,8 @@ def _restored(arrays: Mapping[str, Any], facts: Mapping[str, Any]) -> MergedIden
             "record_status": Status(facts["record_status"]),
             "kinds": facts["kinds"],
             "constants": {name: (pair[0], pair[1]) for name, pair in facts["constants"].items()},
+            # Files of before have none.
+            "expansions": curves_from(facts.get("expansions", {})),
             "tests": facts["tests"],
             "jumps": tuple(facts["jumps"]),
             "trial_spread": {

@@ -13,7 +13,7 @@ from tvident import _arguments as arguments
 from tvident._clocks import Passed
 from tvident._equation import COEFFICIENTS
 from tvident._merged.call import AskedTogether, TermValues
-from tvident._merged.elements import Element, kind_or_number
+from tvident._merged.elements import Element, check_expansions, kind_or_number, on_grid
 from tvident._merged.mechanism import Mechanism
 from tvident._merged.merging import Merging, Part
 from tvident._merged.predicted import Equations, TrialArrays
@@ -106,7 +106,7 @@ class Masses:
                 )
                 place += 1
         own_kinds = frozenset(self.structure.kinds) if isinstance(self.structure, Mechanism) else frozenset()
-        return whole, asked.as_before(found, own_kinds)
+        return whole, [on_grid(one, asked.sampling) for one in asked.as_before(found, own_kinds)]
 
     @property
     def channels(self) -> list[Numbers]:
@@ -272,6 +272,8 @@ def identify_masses(trials: Sequence[Masses], asked: AskedTogether, term_values:
     """Identify the elements of several masses, from one trial or from several that share them."""
     joined, elements = _joined(trials).with_elements(asked, term_values)
     several = [joined] if len(trials) == 1 else trials
+    beside = {"weights": any(one.weights is not None for one in several)}
+    check_expansions(elements, max(one.angles[0].size for one in several), beside)
     if all(element.is_known for element in elements):
         raise ValueError("at least one element must be unknown; all are given; use 'windowed' or 'constant' for one")
     if not joined.driven and not any(one.is_known and one.value for one in elements):
@@ -320,7 +322,7 @@ def identify_masses(trials: Sequence[Masses], asked: AskedTogether, term_values:
             own=asked.own,
         ),
         terms=[name for name, _ in asked.terms],
-        kinds_of_terms={name: kind for name, kind in asked.terms if kind is not None},
+        kinds_of_terms=asked.kinds_of_terms,
     )
     return MergedIdentification(merging)
 

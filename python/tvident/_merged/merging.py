@@ -11,6 +11,7 @@ import numpy.typing as npt
 from tvident import _core
 from tvident._equation import COEFFICIENTS
 from tvident._merged.elements import Element
+from tvident._merged.expanded import FoundExpanded
 from tvident._merged.predicted import Equations
 from tvident._merged.recorded import MergedRecorded
 from tvident._merged.sampling import Sampling
@@ -33,7 +34,7 @@ class Identifiable:
 class Part:
     """What one call of the core found, what it was given, how it is done once more for other samples, and which lengths were chosen."""
 
-    found: _core.MergedIdentification
+    found: _core.MergedIdentification | FoundExpanded
     equations: Equations
     again: Callable[[Equations], Part]
     chosen: Sequence[str] = ()

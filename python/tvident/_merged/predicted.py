@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from tvident._expansion import Expansion
 from tvident._merged.elements import Element
 from tvident._results import correlated_with, kernels_of, touched_by
 
@@ -33,6 +34,24 @@ class Equations:
     elements: Sequence[Element]
     numbers: Sequence[int]
     trials: Sequence[TrialArrays]
+
+    @property
+    def expansions(self) -> dict[str, Expansion]:
+        """Elements that are sums of functions, by name."""
+        return {one.name: one.expansion for one in self.elements if one.expansion is not None}
+
+    @property
+    def in_windows(self) -> Equations:
+        """The equations with windows in the place of functions."""
+        return replace(self, elements=[one.in_windows for one in self.elements])
+
+    def of_sizes(self, sizes: Mapping[str, Any]) -> Equations:
+        """Return the equations with as many functions as these."""
+        elements = [
+            replace(one, value=replace(one.expansion, size=sizes[one.name])) if one.expansion is not None else one
+            for one in self.elements
+        ]
+        return replace(self, elements=elements)
 
 
 def predicted(

@@ -14,6 +14,7 @@ from tvident._equation import COEFFICIENTS
 from tvident._merged.determined import undetermined
 from tvident._merged.earlier import stored
 from tvident._merged.elements import matrix_of
+from tvident._merged.expanded import FoundExpanded
 from tvident._merged.held_back import HeldBackTorque
 from tvident._merged.heterogeneity import differences_of, excess
 from tvident._merged.merging import Identifiable, Merging, Part
@@ -21,7 +22,7 @@ from tvident._merged.oscillating import Oscillating
 from tvident._merged.reported import Reported
 from tvident._merged.short import as_html, in_one_line
 from tvident._merged.words import whose
-from tvident._results import samples_between, scan_of
+from tvident._results import ExpandedParameter, samples_between, scan_of
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -48,7 +49,9 @@ class MergedIdentification(Oscillating, Reported):
     constants : dict of str to (value, stderr)
         Elements that are constant.
     kinds : dict of str to str
-        ``"constant"``, ``"windowed"`` or ``"known"``, by element.
+        ``"constant"``, ``"windowed"``, ``"expanded"`` or ``"known"``, by element.
+    expansions : dict of str to ExpandedParameter
+        Elements that are sums of functions, by name: as curves of what they are functions of.
     stderr : dict of str to ndarray
         Standard errors of all elements and of ``"inertia"``, ``"damping"`` and ``"stiffness"``, in their shapes. Where trials differ by
         more than their errors explain, those of the elements that do are larger by as much.
@@ -103,8 +106,9 @@ class MergedIdentification(Oscillating, Reported):
         self._scatter: dict[str, float] = {}
         self.tests: dict[str, float] = {}
         self.jumps: tuple[float, ...] = ()
+        self.expansions: dict[str, ExpandedParameter] = {}
         for element in merging.elements:
-            value = np.nan if isinstance(element.value, str) else float(element.value)
+            value = element.number
             self.elements[element.name] = np.full(size, value)
             self.stderr[element.name] = np.full(size, np.nan if np.isnan(value) else 0.0)
             self.kinds[element.name] = "known" if element.is_known else "constant"
@@ -190,7 +194,17 @@ class MergedIdentification(Oscillating, Reported):
             recorded=None,
             is_part=True,
         )
-        whole = ("kinds", "constants", "tests", "trial_spread", "identifiable", "settings", "scans", "record_status")
+        whole = (
+            "kinds",
+            "constants",
+            "expansions",
+            "tests",
+            "trial_spread",
+            "identifiable",
+            "settings",
+            "scans",
+            "record_status",
+        )
         along = ("residual_std", "status")
         known: dict[str, Any] = {name: getattr(self, name) for name in (*whole, "_told")}
         known |= {name: getattr(self, name)[samples] for name in along}
@@ -235,7 +249,9 @@ class MergedIdentification(Oscillating, Reported):
         self.units = dict(merging.units)
 
     def _take(self, part: Part, size: int) -> None:
-        """Take what the core found of some elements."""
+        """Take what was found of some elements."""
+        if isinstance(part.found, FoundExpanded):
+            self.expansions |= part.found.curves
         for one in part.found.elements:
             name = part.names[one.element]
             scatter = 1.0
@@ -377,7 +393,15 @@ class MergedIdentification(Oscillating, Reported):
             "noise": [list(map(list, one.noise)) for one in of],
             "prediction_error": [one.prediction_error for one in of],
             "step": merging.step,
+            **({"expansions": sizes} if (sizes := self._sizes()) else {}),
             **merging.sampling.settings,
+        }
+
+    def _sizes(self) -> dict[str, Any]:
+        """Return which functions were taken, as plain JSON."""
+        return {
+            name: {"family": one.family, "size": one.size, "limits": one.limits}
+            for name, one in self.expansions.items()
         }
 
     def __repr__(self) -> str:

@@ -86,6 +86,13 @@ class Sampling:
             return values
         return self.clock.evened({"": values}, propagate=False, workers=self.workers).channels[""]
 
+    def known(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Return what is known at every sample on the grid, along straight lines."""
+        if self.clock is None:
+            return values
+        found = self.clock.evened({}, propagate=False, workers=self.workers).known(values)
+        return np.asarray(found, np.float64)
+
     def mask(self, mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
         """Return where on the grid the samples on both sides may be used."""
         if self.clock is None:

@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._files import write_result
-from tvident._results import plain_scan, plain_words
+from tvident._merged.elements import Element
+from tvident._results import plain_curves, plain_scan, plain_words
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -41,13 +42,14 @@ def store(path: Path, result: Any) -> None:
         "kind": KIND,
         "format": FORMAT,
         "settings": result.settings,
-        "elements": [asdict(element) for element in merging.elements],
+        "elements": [_plain_element(element) for element in merging.elements],
         "merging": {name: getattr(merging, name) for name in ("step", "samples", "trials", "masses", "is_part")},
         "sampling": [merging.sampling.period, merging.sampling.start],
         "inertia": list(merging.inertia),
         "units": result.units,
         "kinds": result.kinds,
         "constants": result.constants,
+        "expansions": plain_curves(result.expansions),
         "tests": result.tests,
         "jumps": result.jumps,
         "trial_spread": {name: [one.tolist() for one in pair] for name, pair in result.trial_spread.items()},
@@ -58,6 +60,12 @@ def store(path: Path, result: Any) -> None:
         "between": between,
     }
     write_result(path, arrays, result.units, json.dumps(facts))
+
+
+def _plain_element(element: Element) -> dict[str, Any]:
+    """Return an element as JSON has it; functions are with their curves."""
+    value = element.value if element.expansion is None else "expanded"
+    return {"name": element.name, "of": element.of, "entries": element.entries, "value": value}
 
 
 def entries_of(pattern: Array) -> list[tuple[tuple[int, int], Array]]:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._equation import COEFFICIENTS
+from tvident._expansion import Expansion
 from tvident._merged.elements import Element, Entry, kind_or_number, unmentioned
 
 Link: TypeAlias = tuple[int | Literal["base"], int | Literal["base"]]
@@ -97,8 +98,8 @@ class Chain:
         Parameters
         ----------
         given : mapping of str to object
-            For inertia, damping and stiffness a kind or a number for all, one for each in a sequence, or some in a mapping by name or by
-            what is connected.
+            For inertia, damping and stiffness a kind, a number or an Expansion for all, one for each in a sequence, or some in a mapping
+            by name or by what is connected.
 
         Returns
         -------
@@ -143,10 +144,10 @@ class Matrix:
     shape : {"full", "symmetric", "diagonal"}
         ``"full"``: every entry is an unknown of its own. ``"symmetric"``: entries that mirror each other are one. ``"diagonal"``: the
         others are zero.
-    kind : str or float
+    kind : str, float or Expansion
         Of every entry that `entries` does not name.
-    entries : mapping of (int, int) to str or float, optional
-        Kinds or known values of some entries; of a symmetric matrix one stands for its mirror image, too.
+    entries : mapping of (int, int) to str, float or Expansion, optional
+        Kinds, known values or functions of some entries; of a symmetric matrix one stands for its mirror image, too.
     tied : sequence of sequence of (int, int), optional
         Entries that are one unknown.
 
@@ -173,8 +174,8 @@ class Matrix:
     """
 
     shape: Literal["full", "symmetric", "diagonal"] = "full"
-    kind: str | float = "auto"
-    entries: Mapping[tuple[int, int], str | float] = field(default_factory=dict)
+    kind: str | float | Expansion = "auto"
+    entries: Mapping[tuple[int, int], str | float | Expansion] = field(default_factory=dict)
     tied: Sequence[Sequence[tuple[int, int]]] = ()
 
     def __post_init__(self) -> None:
@@ -196,7 +197,9 @@ class Matrix:
             raise ValueError(f"an entry must be tied once; got tied={self.tied}; merge the groups that share an entry")
         object.__setattr__(self, "tied", tuple(groups))
         for entry, value in self.entries.items():
-            if self.entries.get(self._one_of(entry), value) != value:
+            other = self.entries.get(self._one_of(entry), value)
+            # Channels of functions are arrays, which are not compared.
+            if other is not value and (isinstance(value, Expansion) or other != value):
                 raise ValueError(
                     f"an entry of a symmetric matrix must be what its mirror image is; got {arguments.shown(value)} for {entry} and "
                     f"{arguments.shown(self.entries[self._one_of(entry)])} for {self._one_of(entry)}; give one of them, or shape='full'"
@@ -255,16 +258,16 @@ def matrices(given: Mapping[str, Any], masses: int) -> list[Element]:
             one = value
         elif value is None or isinstance(value, str) or np.ndim(value) == 0:
             scalar: Any = "auto" if value is None else value
-            one = Matrix("diagonal" if not isinstance(scalar, str) else "full", scalar)
+            one = Matrix("full" if isinstance(scalar, str | Expansion) else "diagonal", scalar)
         else:
             rows = [list(row) if isinstance(row, Sequence | np.ndarray) else [row] for row in value]
             if len(rows) != masses or any(len(row) != masses for row in rows):
                 raise ValueError(
                     f"{of} must have {masses} rows of {masses} entries, one for each mass; got {arguments.shown(value)}; "
-                    "give a kind or a number for every entry"
+                    "give a kind, a number or an Expansion for every entry"
                 )
             each = {
-                (i, j): one if isinstance(one, str) else float(one)
+                (i, j): one if isinstance(one, str | Expansion) else float(one)
                 for i, row in enumerate(rows)
                 for j, one in enumerate(row)
             }

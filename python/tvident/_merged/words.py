@@ -11,6 +11,7 @@ from tvident import _core
 from tvident._advice import held, spoilt
 from tvident._equation import BUILT_IN
 from tvident._files import aligned
+from tvident._merged.expanded import FoundExpanded
 from tvident._merged.merging import Merging, Part
 from tvident._results import COLUMNS, Words, row_of, sentences_of
 from tvident._status import Status, describe
@@ -36,7 +37,11 @@ def words_of(result: Any, merging: Merging, scatter: Mapping[str, float]) -> Wor
     for part in merging.parts:
         one = part.found
         reasons += _reasons_of(one)
-        advice += [words for flag, words in _DOUBTS.items() if one.record_status & flag]
+        if isinstance(one, FoundExpanded):
+            reasons += one.words.reasons
+            advice += one.words.advice
+        else:
+            advice += [words for flag, words in _DOUBTS.items() if one.record_status & flag]
         advice += [_SILENT] if one.misfit > 1 else []
         advice += _channels_of(part, merging.masses, sampling.period)
         advice += _lacking_terms(part, merging)
@@ -150,12 +155,12 @@ def _changing(result: Any) -> list[str]:
     return [f"{words}: ask for the kind 'windowed', or look for a term that is missing"]
 
 
-def _reasons_of(one: _core.MergedIdentification) -> list[str]:
+def _reasons_of(one: _core.MergedIdentification | FoundExpanded) -> list[str]:
     """Return what was chosen for equations that share unknowns."""
     function = f"the test function has {one.window_length} samples and exponent {one.exponent}"
-    reasons = [
-        f"{function}; rows are predicted with {one.prediction_error:.2f} times the variance of the channels' noise"
-    ]
+    times = f"rows are predicted with {one.prediction_error:.2f} times the variance of the channels' noise"
+    # What sums of functions leave stands in their own words.
+    reasons = [function if isinstance(one, FoundExpanded) else f"{function}; {times}"]
     colour = max(one.colours, default=1.0)
     if colour > 1:
         reasons.append(

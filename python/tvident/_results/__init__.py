@@ -17,6 +17,7 @@ from tvident._results.scan import Scan, scan_of
 from tvident._results.short import part_trusted, samples_and_seconds
 from tvident._results.simulated import POOR, in_units_of, predicted_ahead, predicted_at_samples
 from tvident._results.stored import plain_scan, plain_words, scan_from, words_from
+from tvident._results.stored_curves import curves_from, plain_curves
 from tvident._results.stored_lists import KIND_OF_LISTS
 from tvident._results.summary import COLUMNS, row_of, sentences_of
 from tvident._results.told import Telling
@@ -32,6 +33,7 @@ from tvident._results.verdict import (
     verdict_of_trusted,
     why_not,
 )
+from tvident._results.windows_beside import WindowsBeside
 from tvident._results.words import BECOMES, FED_BACK, TRIED, UNTOLD_LAG, Words, of_batch
 
 __all__ = [
@@ -54,6 +56,7 @@ __all__ = [
     "Scan",
     "Shared",
     "Telling",
+    "WindowsBeside",
     "Words",
     "accounted_for",
     "begins_once",
@@ -61,6 +64,7 @@ __all__ = [
     "chosen",
     "correlated_with",
     "covariance_between",
+    "curves_from",
     "every_sample",
     "explained_steps",
     "from_file",
@@ -78,6 +82,7 @@ __all__ = [
     "of_records",
     "part_trusted",
     "parts_of",
+    "plain_curves",
     "plain_scan",
     "plain_words",
     "predicted_ahead",
