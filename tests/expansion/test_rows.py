@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import islice
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -121,8 +122,9 @@ def test_whitening_is_that_of_the_dense_covariance(seed: int, rows: int, lags: i
 @pytest.mark.parametrize("role", ["stiffness", "damping", "inertia"])
 @pytest.mark.parametrize("equations", [1, 2])
 @pytest.mark.parametrize("trials", [1, 2])
+@pytest.mark.parametrize("weighted", [False, True])
 def test_least_squares_are_those_of_dense_matrices_with_the_noise_of_the_angles_taken_off(
-    role: str, equations: int, trials: int
+    role: str, equations: int, trials: int, *, weighted: bool
 ) -> None:
     samples, generator = 400, np.random.default_rng(3)
     basis = of_time("bspline", 5, samples)
@@ -139,9 +141,10 @@ def test_least_squares_are_those_of_dense_matrices_with_the_noise_of_the_angles_
         there = np.ones((equations, length), bool)
         there[-1, 100:103] = trial == 0
         angles, torques = generator.standard_normal((2, equations, length))
-        records.append(
-            ExpandedRecord(angles, torques, there, np.ones(length, bool), PERIOD, 24, 6, terms=[np.ones(length)])
-        )
+        spread = generator.uniform(0.2, 5, length) if weighted else None
+        # A torque that is late by some samples takes their weights with it.
+        late: Any = {"lag": 2.0 if weighted else 0.0, "spread": spread, "terms": [np.ones(length)]}
+        records.append(ExpandedRecord(angles, torques, there, np.ones(length, bool), PERIOD, 24, 6, **late))
     curves: Curves = [(between, [level, nothing, nothing]), (last, [0.3 * level, nothing])]
     around = Linearised(records, curves, noise, [])
     unknowns = [
@@ -175,10 +178,14 @@ def _dense(one: ExpandedRecord, curves: Curves, noise: Noise, unknowns: list[Exp
             torque[row, equation, equation, some] = kernel
     usable = one.usable_rows().ravel()
     entering, torque = (each.reshape(one.rows * count, -1)[usable] for each in (entering, torque))
-    of_angles, of_torques = (np.repeat(each, samples) for each in noise)
+    spread = np.ones(samples) if one.spread is None else one.spread
+    of_angles = np.repeat(noise[0], samples) * np.tile(spread, channels)
+    late = round(one.lag)
+    # What is moved in from beyond the end is in no row that is usable.
+    of_torques = np.repeat(noise[1], samples) * np.tile(np.roll(spread, -late), count)
     covariance = entering * of_angles @ entering.T + torque * of_torques @ torque.T
     covariance += RIDGE * np.diag(np.diagonal(covariance))
-    rhs = torque @ one.torques.ravel()
+    rhs = torque @ np.roll(one.torques, -late, axis=1).ravel()
     # None of the terms is known about.
     left = rhs - entering @ one.angles.ravel()
     shown = -of_angles * (entering.T @ np.linalg.solve(covariance, left))

@@ -15,6 +15,7 @@ from tvident._expansion.rows import (
     of_one,
     placed,
     reach_over,
+    spread_of,
 )
 from tvident._expansion.search import (
     DERIVATIVES,
@@ -62,5 +63,6 @@ __all__ = [
     "rates_of",
     "reach_over",
     "refuse",
+    "spread_of",
     "variance_of_steps",
 ]

@@ -149,6 +149,11 @@ def of_one(role: str, number: int = 0) -> Places:
     return ((0, role, number, 1.0),)
 
 
+def spread_of(weights: Array | None) -> Array | None:
+    """Return the variance of the noise of samples over that of one of weight one; samples without a weight are not usable anyway."""
+    return None if weights is None else np.asarray(1 / np.where(weights > 0, weights, 1.0))
+
+
 @dataclass(frozen=True)
 class ExpandedRecord:
     """A record as rows are made of it: those of all equations at one time follow each other.
@@ -168,6 +173,8 @@ class ExpandedRecord:
         By how many samples the torques come late.
     terms : sequence of ndarray, shape (n,)
         What the factors of terms multiply, by the number of the term.
+    spread : ndarray, shape (n,), optional
+        Variance of the noise of every sample over that of a sample of weight one: one over its weight; none where all are alike.
     """
 
     angles: Array
@@ -179,6 +186,7 @@ class ExpandedRecord:
     exponent: int
     lag: float = 0.0
     terms: Sequence[Array] = ()
+    spread: Array | None = None
 
     @property
     def samples(self) -> int:
@@ -220,6 +228,10 @@ class ExpandedRecord:
         whole = round(self.lag)
         torques = np.stack([_moved(one, whole) for one in self.torques])
         return torques, Kernels.of(self.half, self.exponent, self.period, self.lag - whole).value
+
+    def late_spread(self) -> Array | None:
+        """Return the spread of the torques' noise, moved as they are."""
+        return None if self.spread is None else _moved(self.spread, round(self.lag))
 
     def usable_rows(self) -> npt.NDArray[np.bool_]:
         """Return which rows are equations, shape (rows, equations): those that touch no missing sample."""

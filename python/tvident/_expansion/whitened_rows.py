@@ -102,26 +102,43 @@ class WhitenedRows:
             left[some] = rhs[some] - self._motion(entering, record.angles[:, samples])
             torques = record.torques_of_terms(self._curves, samples)
             left[some] -= np.stack([record.windows(one) @ record.kernels.value for one in torques], axis=1)
+            spread = self._spread_over(entering, samples)
             for lag in range(min(record.lags, some.stop - some.start)):
-                self._add_covariance(band, some, lag, entering)
+                self._add_covariance(band, some, lag, spread)
         return band, left, rhs
 
     def _add_covariance(self, band: Array, some: slice, lag: int, entering: dict[tuple[int, int], Array]) -> None:
-        """Note the covariance of rows of a piece that are some times apart."""
+        """Note the covariance of rows of a piece that are some times apart; entering is how much noise of deviation one enters each."""
         record, count = self.record, self.record.equations
         angles, torques = self._noise
         apart, rows = lag * record.stride, some.stop - some.start - lag
-        white = float(self._late[: record.length - apart] @ self._late[apart:])
+        white = self._white(slice((some.start + lag) * record.stride, None), rows, apart)
         for equation in range(count):
             places = slice((some.start + lag) * count + equation, some.stop * count, count)
             for other in range(equation + 1 if lag == 0 else count):
-                shared = np.full(rows, torques[equation] * white if equation == other else 0.0)
+                shared = torques[equation] * white if equation == other else np.zeros(rows)
                 for channel, variance in enumerate(angles):
                     one, two = entering.get((equation, channel)), entering.get((other, channel))
                     if one is not None and two is not None and variance:
                         both = np.einsum("ij,ij->i", one[lag:, : record.length - apart], two[:rows, apart:])
                         shared += variance * both
                 band[places, lag * count + equation - other] = shared
+
+    def _white(self, samples: slice, rows: int, apart: int) -> Array:
+        """Return the covariance that noise of the torque of variance one gives rows from a sample on with rows some samples before."""
+        later, earlier = self._late[: self.record.length - apart], self._late[apart:]
+        spread = self.record.late_spread()
+        if spread is None:
+            return np.full(rows, later @ earlier)
+        products = later * earlier
+        return self.record.windows(spread[samples])[:rows, : products.size] @ products
+
+    def _spread_over(self, entering: dict[tuple[int, int], Array], samples: slice) -> dict[tuple[int, int], Array]:
+        """Return how much noise of deviation one enters rows, where samples of small weights have more."""
+        if self.record.spread is None:
+            return entering
+        deviations = self.record.windows(np.sqrt(self.record.spread[samples]))
+        return {place: kernels * deviations for place, kernels in entering.items()}
 
     def _motion(self, entering: dict[tuple[int, int], Array], angles: Array) -> Array:
         """Return what the motion of some angles makes of a piece's rows, shape (rows, equations)."""
@@ -140,7 +157,8 @@ class WhitenedRows:
                 weighted, piece = kernels * weights[some, equation, np.newaxis], shown[channel, samples]
                 for place in range(record.length):
                     piece[place : place + (count - 1) * record.stride + 1 : record.stride] += weighted[:, place]
-        return np.asarray(-np.asarray(self._noise[0])[:, np.newaxis] * shown)
+        variances = np.asarray(self._noise[0])[:, np.newaxis] * (1.0 if record.spread is None else record.spread)
+        return np.asarray(-variances * shown)
 
     def _without_noise(self, rhs: Array, shown: Array, known: Curves) -> Array:
         """Return the right-hand sides without the noise that is shown, and without what is known."""

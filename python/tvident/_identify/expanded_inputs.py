@@ -22,6 +22,7 @@ from tvident._expansion import (
     of_one,
     part_of,
     rates_of,
+    spread_of,
 )
 from tvident._identify.data import Data
 from tvident._identify.settings import Request
@@ -98,6 +99,7 @@ class ExpandedInputs:
             exponent=int(settings["exponent"]),
             lag=float(late[0]),
             terms=[np.where(usable, samples, 0.0) for samples in terms],
+            spread=spread_of(data.weights_of_core(strong=False)),
         )
 
     @cached_property
@@ -171,6 +173,8 @@ class ExpandedInputs:
         """Variances of the noise of angle and torque."""
         (angle,) = _core.noise(self.data.angles, self.request.quantisation)
         shown = self.pilot.settings.get("shown_noise")
-        torque = float(shown[0]) if shown else _core.noise(self.data.torques)[0].sigma ** 2
+        # A channel tells the noise of all samples, parameters are found with that of one of mean weight.
+        mean = 1.0 if self.data.weights is None else self.data.weights.spread[0]
+        torque = float(shown[0]) if shown else _core.noise(self.data.torques)[0].sigma ** 2 / mean
         least = float(np.mean(self.record.torques**2)) * _QUIET**2
-        return [angle.sigma**2], [max(torque, least) or 1.0]
+        return [angle.sigma**2 / mean], [max(torque, least) or 1.0]

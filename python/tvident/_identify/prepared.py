@@ -105,7 +105,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
     )
     asked = loss_of(call["loss"], call["settings"])
     beside = {"uneven times": grid, "a clock of the torque": clocks, "loss": asked != "squares" or None}
-    weighted = _weights(call, torques.shape, {**beside, "an Expansion": expansions_of(request) or None})
+    weighted = _weights(call, torques.shape, beside)
     channels, torques = usable_channels(channels, torques, weighted, call["nan_policy"])
     doubts: list[tuple[int, str]] = []
     turn = request.period

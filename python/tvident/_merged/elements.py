@@ -122,27 +122,20 @@ def kind_or_number(name: str, value: object) -> Kind | float | Expansion:
     return found
 
 
-def check_expansions(elements: Sequence[Element], samples: int, beside: Mapping[str, bool]) -> None:
+def check_expansions(elements: Sequence[Element], samples: int, phase: object = None) -> None:
     """Refuse windows beside sums of functions, functions that rows cannot use, and channels of another length.
-
-    Parameters
-    ----------
-    elements : sequence of Element
-    samples : int
-        Of the result.
-    beside : mapping of str to bool
-        Options beside which there are no sums of functions yet, and whether they are given.
 
     Raises
     ------
     ValueError
-        If there are any.
+        If there are any, or trials are aligned on a phase.
     """
     expanded = [one for one in elements if one.expansion is not None]
-    given = [name for name, is_given in beside.items() if is_given and expanded]
-    if given:
+    if expanded and phase is not None:
         refuse(
-            f"an Expansion of {expanded[0].name} needs trials as they are", f"{given[0]}= beside it", _WITHOUT[given[0]]
+            f"an Expansion of {expanded[0].name} needs trials as they are",
+            "phase= beside it",
+            "cut trials to the same length, or use 'windowed'",
         )
     for one in expanded:
         if one.expansion is not None:
@@ -154,12 +147,6 @@ def check_expansions(elements: Sequence[Element], samples: int, beside: Mapping[
             f"{windowed[0]}='windowed'",
             f"say {windowed[0]}='constant', or give an Expansion of time",
         )
-
-
-_WITHOUT = {
-    "weights": "leave them out, leave samples out by mask=, or use 'windowed'",
-    "phase": "cut trials to the same length, or use 'windowed'",
-}
 
 
 def unmentioned(name: str, given: Mapping[Any, object], known: Sequence[Any]) -> None:

@@ -15,7 +15,7 @@ from tvident import _core
 from tvident._advice import found_expansion, words_of_expansions
 from tvident._derivatives import fit_local_polynomials
 from tvident._equation import COEFFICIENTS
-from tvident._expansion import Curves, ExpandedRecord, Noise, RecordPart, SizeSearch, part_of, rates_of
+from tvident._expansion import Curves, ExpandedRecord, Noise, RecordPart, SizeSearch, part_of, rates_of, spread_of
 from tvident._merged.elements import Element
 from tvident._merged.predicted import Equations, TrialArrays
 from tvident._results import ExpandedFit, ExpandedParameter, WindowsBeside, Words
@@ -111,6 +111,7 @@ class ExpandedEquations:
             half=self.windows.window_length // 2,
             exponent=self.windows.exponent,
             terms=list(np.where(is_term, terms, 0.0)),
+            spread=spread_of(trial[5]),
         )
 
     @cached_property
