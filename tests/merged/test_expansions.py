@@ -258,6 +258,16 @@ def test_a_phase_is_refused() -> None:
         )
 
 
+def test_a_mechanism_is_refused() -> None:
+    recorded = masses()
+    kinds: Any = {"first": Expansion("bspline", size=4)}
+    bodies = tvident.Mechanism(
+        kinetic={"first": lambda _, v: v[0] ** 2 / 2, "second": lambda _, v: v[1] ** 2 / 2}, kinds=kinds
+    )
+    with pytest.raises(ValueError, match="an Expansion of first needs channels as they were recorded; got a Mechanism"):
+        identify(recorded.angle, recorded.torque, sample_rate=1000, dof_axis=0, structure=bodies)
+
+
 def test_noise_alone_is_no_curve() -> None:
     angle, torque = np.random.default_rng(0).standard_normal((2, 2, 4000))
     found = identify(angle, torque, stiffness=Expansion("bspline"), **OPTIONS)

@@ -182,7 +182,7 @@ def identify_trials(trials: Trials, asked: AskedTogether, term_values: TermValue
     for place, (name, kind) in enumerate(asked.terms):
         elements.append(Element(name, name, ((0, None, place, 1.0),), kind_or_number(name, kind or "constant")))
     elements = [on_grid(one, asked.sampling) for one in asked.as_before(elements)]
-    check_expansions(elements, trials.samples, trials.phase)
+    check_expansions(elements, trials.samples, has_phase=trials.phase is not None)
     if all(element.is_known for element in elements):
         raise ValueError("at least one parameter must be unknown; all are given; use 'windowed' or 'constant' for one")
     given = []

@@ -122,20 +122,28 @@ def kind_or_number(name: str, value: object) -> Kind | float | Expansion:
     return found
 
 
-def check_expansions(elements: Sequence[Element], samples: int, phase: object = None) -> None:
+def check_expansions(
+    elements: Sequence[Element], samples: int, *, has_phase: bool = False, has_momenta: bool = False
+) -> None:
     """Refuse windows beside sums of functions, functions that rows cannot use, and channels of another length.
 
     Raises
     ------
     ValueError
-        If there are any, or trials are aligned on a phase.
+        If there are any, if trials are aligned on a phase, or if momenta follow from smoothed velocities: their noise is not known.
     """
     expanded = [one for one in elements if one.expansion is not None]
-    if expanded and phase is not None:
+    if expanded and has_phase:
         refuse(
             f"an Expansion of {expanded[0].name} needs trials as they are",
             "phase= beside it",
             "cut trials to the same length, or use 'windowed'",
+        )
+    if expanded and has_momenta:
+        refuse(
+            f"an Expansion of {expanded[0].name} needs channels as they were recorded",
+            "a Mechanism, whose momenta follow from smoothed velocities",
+            "use 'windowed', or give it one energy for each of the functions",
         )
     for one in expanded:
         if one.expansion is not None:

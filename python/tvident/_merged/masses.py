@@ -272,7 +272,7 @@ def identify_masses(trials: Sequence[Masses], asked: AskedTogether, term_values:
     """Identify the elements of several masses, from one trial or from several that share them."""
     joined, elements = _joined(trials).with_elements(asked, term_values)
     several = [joined] if len(trials) == 1 else trials
-    check_expansions(elements, max(one.angles[0].size for one in several))
+    check_expansions(elements, max(one.angles[0].size for one in several), has_momenta=bool(joined.momenta))
     if all(element.is_known for element in elements):
         raise ValueError("at least one element must be unknown; all are given; use 'windowed' or 'constant' for one")
     if not joined.driven and not any(one.is_known and one.value for one in elements):
