@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pytest
 
 import tvident
+from merged import gait
 from merged.simulated import Masses, Trials, chain, simulated
 
 Array = npt.NDArray[np.float64]
@@ -244,18 +245,29 @@ def test_what_cannot_be_is_refused(options: Any, message: str) -> None:
         identify(recorded.angle, recorded.torque, **OPTIONS, **options)
 
 
-def test_a_phase_is_refused() -> None:
-    several = trials(count=2)
-    phase = [np.linspace(0, 1, SAMPLES // 2)] * 2
-    with pytest.raises(ValueError, match="needs trials as they are; got phase= beside it; cut trials"):
-        identify(
-            several.angle,
-            several.torque,
-            sample_rate=1000,
-            ensemble_axis=0,
-            phase=phase,
-            stiffness=Expansion("bspline"),
-        )
+def test_cycles_of_gait_share_harmonics_of_their_phase() -> None:
+    walk = gait.simulated(0, rate=250.0)
+    angles, torques, phases = gait.cycles(walk)
+    harmonics = Expansion("fourier", size=15, limits=(0, 1))
+    options = {"sample_rate": walk.sample_rate, "ensemble_axis": 0, "terms": [], "phase": phases}
+    found = identify(angles, torques, stiffness=harmonics, damping=harmonics, **options)
+    first = walk.phase < 1
+    for name in ("damping", "stiffness"):
+        true = np.interp(found.phase, walk.phase[first], walk.truth[name][first])
+        assert np.sqrt(np.mean((getattr(found, name) - true) ** 2)) < 0.03 * true.mean()
+        assert np.mean(np.abs(getattr(found, name) - true) < 1.96 * found.stderr[name]) > 0.8
+    value, error = found.constants["inertia"]
+    assert abs(value - walk.truth["inertia"][0]) < 4 * error
+    curve = found.expansions["stiffness"]
+    assert curve.unit_of == ""
+    np.testing.assert_allclose(curve.at(found.phase), found.stiffness, rtol=1e-9)
+    # As harmonics of the phase in one record, which cuts nothing.
+    whole = gait.harmonics(walk, 15)
+    between = np.interp(walk.phase % 1, found.phase, found.stiffness)
+    assert np.median(np.abs(between / whole["stiffness"] - 1)) < 0.005
+    # Functions that do not go on into the next cycle know less of its ends.
+    splines = identify(angles, torques, stiffness=Expansion("bspline", size=20), damping=harmonics, **options)
+    assert np.median(np.abs(splines.stiffness / found.stiffness - 1)) < 0.02
 
 
 def test_a_mechanism_is_refused() -> None:

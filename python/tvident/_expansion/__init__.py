@@ -1,5 +1,6 @@
 """Expands parameters in functions of time or of a recorded channel: families, sizes by a criterion, weighted rows in weak form."""
 
+from tvident._expansion.alignment import AlignedSamples
 from tvident._expansion.basis import Basis, Coordinate
 from tvident._expansion.coordinates import Rates, check_expansion, part_of, refuse
 from tvident._expansion.expansion import Expansion
@@ -12,6 +13,7 @@ from tvident._expansion.rows import (
     ExpandedUnknown,
     Places,
     condition_of_curves,
+    curve_length,
     of_one,
     placed,
     reach_over,
@@ -34,6 +36,7 @@ from tvident._expansion.whitened_rows import Noise
 __all__ = [
     "DERIVATIVES",
     "SLACK",
+    "AlignedSamples",
     "Basis",
     "Coordinate",
     "Curves",
@@ -54,6 +57,7 @@ __all__ = [
     "check_expansion",
     "condition_of_curves",
     "curve_along",
+    "curve_length",
     "curves_of",
     "family_from",
     "of_one",

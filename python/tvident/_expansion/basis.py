@@ -28,11 +28,14 @@ class Coordinate:
         Their first and second derivative by time.
     limits : (float, float)
         The range that was scaled, in the channel's unit.
+    is_of_time : bool
+        Whether places grow evenly along the record.
     """
 
     places: Array
     rates: Array
     limits: tuple[float, float]
+    is_of_time: bool = False
 
 
 @dataclass(frozen=True)

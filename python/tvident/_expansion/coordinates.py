@@ -19,7 +19,7 @@ Rates: TypeAlias = Callable[[Array], tuple[Array, Array]]
 """Gives the first and the second derivative of a channel by time; NaN where it is missing."""
 
 
-def part_of(name: str, places: Places, expansion: Expansion, time: Array, rates: Rates) -> RecordPart:
+def part_of(name: str, places: Places, expansion: Expansion, time: tuple[Array, float], rates: Rates) -> RecordPart:
     """Return an expanded unknown before it has a size.
 
     Parameters
@@ -28,8 +28,8 @@ def part_of(name: str, places: Places, expansion: Expansion, time: Array, rates:
     places : Places
         Where it appears.
     expansion : Expansion
-    time : ndarray, shape (n,)
-        Seconds.
+    time : (ndarray, float)
+        Seconds, shape (n,), or what else grows evenly, as a phase does, and by how much in a second.
     rates : callable
         Only asked of channels whose rates rows need.
 
@@ -51,10 +51,12 @@ def part_of(name: str, places: Places, expansion: Expansion, time: Array, rates:
     )
 
 
-def _coordinates_of(name: str, expansion: Expansion, time: Array, rates: Rates | None) -> list[Coordinate]:
+def _coordinates_of(
+    name: str, expansion: Expansion, time: tuple[Array, float], rates: Rates | None
+) -> list[Coordinate]:
     """Return what an expansion is a function of, scaled, with its rates where the equation needs them."""
     found = []
-    each: Sequence[Array] = expansion.channels or [time]
+    each: Sequence[Array] = expansion.channels or [time[0]]
     for channel, given in zip(each, expansion.given_limits, strict=True):
         there = np.isfinite(channel)
         low, high = given or (float(channel[there].min()), float(channel[there].max())) if there.any() else (0, 0)
@@ -71,10 +73,10 @@ def _coordinates_of(name: str, expansion: Expansion, time: Array, rates: Rates |
         places = np.where(there, (channel - low) / (high - low), 0.0)
         along = np.broadcast_to(np.zeros((2, 1)), (2, channel.size))
         if expansion.is_of_time:
-            along = np.broadcast_to(np.array([[1 / (high - low)], [0.0]]), (2, channel.size))
+            along = np.broadcast_to(np.array([[time[1] / (high - low)], [0.0]]), (2, channel.size))
         elif rates is not None:
             along = np.nan_to_num(np.stack(rates(np.where(there, channel, np.nan))) / (high - low))
-        found.append(Coordinate(places, along, (low, high)))
+        found.append(Coordinate(places, along, (low, high), expansion.is_of_time))
     return found
 
 

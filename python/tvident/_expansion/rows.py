@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from tvident._expansion.alignment import AlignedSamples
 from tvident._expansion.basis import AT_A_TIME, Basis
 from tvident._expansion.covariance import BLOCK
 
@@ -175,6 +176,8 @@ class ExpandedRecord:
         What the factors of terms multiply, by the number of the term.
     spread : ndarray, shape (n,), optional
         Variance of the noise of every sample over that of a sample of weight one: one over its weight; none where all are alike.
+    alignment : AlignedSamples, optional
+        Where its samples lie along curves that are shared; by default each at its own number.
     """
 
     angles: Array
@@ -187,6 +190,7 @@ class ExpandedRecord:
     lag: float = 0.0
     terms: Sequence[Array] = ()
     spread: Array | None = None
+    alignment: AlignedSamples | None = None
 
     @property
     def samples(self) -> int:
@@ -261,7 +265,7 @@ class ExpandedRecord:
         sums, least = (np.concatenate([[0.0], np.cumsum(one)]) for one in (squares, by_noise))
         rows = np.arange(self.rows)
         first, end = np.maximum(rows - around // 2, 0), np.minimum(rows + around // 2 + 1, self.rows)
-        moves = sums[end] - sums[first] >= _MOVES * (least[end] - least[first])
+        moves = np.asarray(sums[end] - sums[first] >= _MOVES * (least[end] - least[first]))
         nearest = np.clip((np.arange(self.samples) - self.half + self.stride // 2) // self.stride, 0, self.rows - 1)
         return np.asarray(moves[nearest])
 
@@ -282,24 +286,29 @@ class ExpandedRecord:
         kernels, windows = self.kernels, [self.windows(one[samples]) for one in angles]
         found = np.zeros((len(windows[0]), self.equations, sum(one.size for one in unknowns)))
         for one, place in placed(unknowns):
+            basis = (
+                one.basis
+                if one.basis is None or self.alignment is None
+                else self.alignment.basis(one.basis, self.period)
+            )
             known: dict[tuple[str, int], Array] = {}
             for equation, role, channel, factor in one.entries:
                 if (role, channel) not in known:
                     each = windows[channel] if role != "term" else self.windows(self.terms[channel][samples])
-                    known[role, channel] = self._column(one, each, parts(role, kernels), samples)
+                    known[role, channel] = self._column(basis, each, parts(role, kernels), samples)
                 found[:, equation, place] += factor * known[role, channel]
         return found
 
-    def _column(self, one: ExpandedUnknown, each: Array, weights: Sequence[Array], samples: slice) -> Array:
+    def _column(self, basis: Basis | None, each: Array, weights: Sequence[Array], samples: slice) -> Array:
         """Return the columns of one unknown by the windows of what it multiplies."""
-        if one.basis is None:
+        if basis is None:
             return np.asarray((each @ weights[0])[:, np.newaxis])
-        blocks = one.basis.blocks(samples)
+        blocks = basis.blocks(samples)
         if blocks is not None:
-            return self._sums(each * weights[0], blocks, one.size)
-        column = np.zeros((len(each), one.size))
+            return self._sums(each * weights[0], blocks, basis.size)
+        column = np.zeros((len(each), basis.size))
         for rate, weight in enumerate(weights):
-            self._add_products(each * weight, one.basis.along(samples, rate), column)
+            self._add_products(each * weight, basis.along(samples, rate), column)
         return column
 
     def _sums(self, weighted: Array, blocks: npt.NDArray[np.int64], size: int) -> Array:
@@ -342,6 +351,12 @@ class ExpandedRecord:
                 if role == "term":
                     found[equation] += factor * values[0][samples] * self.terms[number][samples]
         return found
+
+
+def curve_length(records: Sequence[ExpandedRecord]) -> int:
+    """Return how many samples the curves have that records share."""
+    aligned = [one.alignment.length for one in records if one.alignment is not None]
+    return max(aligned or [one.samples for one in records])
 
 
 def _moved(channel: npt.NDArray[Any], later: int) -> npt.NDArray[Any]:

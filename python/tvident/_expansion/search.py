@@ -15,7 +15,7 @@ from tvident._expansion.basis import AT_A_TIME, Basis, Coordinate
 from tvident._expansion.families import Family
 from tvident._expansion.fit import Fitted, Linearised, ScoredSize
 from tvident._expansion.rivals import Rival, Rivals, weights_of
-from tvident._expansion.rows import Curves, ExpandedRecord, ExpandedUnknown, Places, placed
+from tvident._expansion.rows import Curves, ExpandedRecord, ExpandedUnknown, Places, curve_length, placed
 from tvident._expansion.steps import variance_of_steps
 from tvident._expansion.unseen import Bend, Unseen
 from tvident._expansion.whitened_rows import Noise
@@ -278,8 +278,7 @@ class SizeSearch:
         return np.concatenate(found)
 
     def _around(self, sizes: Sequence[Sequence[int]], fitted: Fitted) -> Linearised:
-        samples = max(one.samples for one in self.records)
-        curves = curves_of(self._unknowns(sizes), fitted.values, samples)
+        curves = curves_of(self._unknowns(sizes), fitted.values, curve_length(self.records))
         return Linearised(self.records, [*curves, *self.known], self.noise, self.known)
 
 

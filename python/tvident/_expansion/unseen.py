@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._expansion.basis import AT_A_TIME, Basis
-from tvident._expansion.rows import ExpandedRecord
+from tvident._expansion.rows import ExpandedRecord, curve_length
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -64,7 +64,7 @@ class Unseen:
 
     @cached_property
     def _samples(self) -> int:
-        return max(one.samples for one in self.records)
+        return curve_length(self.records)
 
     @property
     def step(self) -> int:
@@ -78,6 +78,8 @@ class Unseen:
         change = np.zeros(self._samples + 1, np.int64)
         for record in self.records:
             centres = np.flatnonzero(record.usable_rows().any(axis=1)) * record.stride + record.half
+            if record.alignment is not None:
+                centres = record.alignment.nearest[centres]
             np.add.at(change, np.maximum(centres - reach, 0), 1)
             np.add.at(change, np.minimum(centres + reach + 1, self._samples), -1)
         return np.cumsum(change[:-1]) > 0

@@ -37,6 +37,7 @@ class WhitenedRows:
 
     def __init__(self, record: ExpandedRecord, curves: Curves, noise: Noise, known: Curves) -> None:
         self.record = record
+        curves, known = (_own(record, one) for one in (curves, known))
         self._curves, self._noise = curves, noise
         self._kept: dict[tuple[str, tuple[int, ...] | None], Array] = {}
         usable = record.usable_rows()
@@ -171,3 +172,10 @@ class WhitenedRows:
                 torques = record.torques_of_terms(known, samples)
                 found[some] -= np.stack([record.windows(one) @ record.kernels.value for one in torques], axis=1)
         return found
+
+
+def _own(record: ExpandedRecord, curves: Curves) -> Curves:
+    """Return curves at the samples of a record."""
+    if record.alignment is None:
+        return curves
+    return [(places, record.alignment.curve(values, record.period)) for places, values in curves]

@@ -119,7 +119,7 @@ class ExpandedInputs:
                 if name in self.terms or name not in self.known_values:
                     found.append(RecordPart(name, entries))
                 continue
-            found.append(part_of(name, entries, expansion, self.data.time, self._rates))
+            found.append(part_of(name, entries, expansion, (self.data.time, 1.0), self._rates))
         if self.zero:
             found.append(RecordPart("angle_zero", of_one("term", len(self.terms))))
         return found

@@ -126,7 +126,9 @@ class AskedTogether:
         assert isinstance(windows.found, _core.MergedIdentification)  # noqa: S101 - for mypy
         time = self.sampling.times(windows.found.status.size)
         units = self.units_of(equations.elements)
-        each = ExpandedEquations(equations, windows.found, self.sampling.period, time, self.step, units)
+        aligned = equations.trials[0][4] is not None
+        phase = np.arange(time.size) / time.size if aligned else None
+        each = ExpandedEquations(equations, windows.found, self.sampling.period, time, self.step, units, phase)
         found = each.found()
         if found is None:
             return windows
@@ -182,7 +184,7 @@ def identify_trials(trials: Trials, asked: AskedTogether, term_values: TermValue
     for place, (name, kind) in enumerate(asked.terms):
         elements.append(Element(name, name, ((0, None, place, 1.0),), kind_or_number(name, kind or "constant")))
     elements = [on_grid(one, asked.sampling) for one in asked.as_before(elements)]
-    check_expansions(elements, trials.samples, has_phase=trials.phase is not None)
+    check_expansions(elements, trials.samples)
     if all(element.is_known for element in elements):
         raise ValueError("at least one parameter must be unknown; all are given; use 'windowed' or 'constant' for one")
     given = []

@@ -122,23 +122,15 @@ def kind_or_number(name: str, value: object) -> Kind | float | Expansion:
     return found
 
 
-def check_expansions(
-    elements: Sequence[Element], samples: int, *, has_phase: bool = False, has_momenta: bool = False
-) -> None:
+def check_expansions(elements: Sequence[Element], samples: int, *, has_momenta: bool = False) -> None:
     """Refuse windows beside sums of functions, functions that rows cannot use, and channels of another length.
 
     Raises
     ------
     ValueError
-        If there are any, if trials are aligned on a phase, or if momenta follow from smoothed velocities: their noise is not known.
+        If there are any, or if momenta follow from smoothed velocities: their noise is not known.
     """
     expanded = [one for one in elements if one.expansion is not None]
-    if expanded and has_phase:
-        refuse(
-            f"an Expansion of {expanded[0].name} needs trials as they are",
-            "phase= beside it",
-            "cut trials to the same length, or use 'windowed'",
-        )
     if expanded and has_momenta:
         refuse(
             f"an Expansion of {expanded[0].name} needs channels as they were recorded",

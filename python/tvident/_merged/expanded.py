@@ -15,7 +15,17 @@ from tvident import _core
 from tvident._advice import found_expansion, words_of_expansions
 from tvident._derivatives import fit_local_polynomials
 from tvident._equation import COEFFICIENTS
-from tvident._expansion import Curves, ExpandedRecord, Noise, RecordPart, SizeSearch, part_of, rates_of, spread_of
+from tvident._expansion import (
+    AlignedSamples,
+    Curves,
+    ExpandedRecord,
+    Noise,
+    RecordPart,
+    SizeSearch,
+    part_of,
+    rates_of,
+    spread_of,
+)
 from tvident._merged.elements import Element
 from tvident._merged.predicted import Equations, TrialArrays
 from tvident._results import ExpandedFit, ExpandedParameter, WindowsBeside, Words
@@ -60,6 +70,8 @@ class ExpandedEquations:
         Seconds.
     step : int
     units : mapping of str to str
+    phase : ndarray, shape (samples,), optional
+        In the place of time, from 0 to 1, where trials are aligned on one.
     """
 
     equations: Equations
@@ -68,6 +80,7 @@ class ExpandedEquations:
     time: Array
     step: int
     units: dict[str, str]
+    phase: Array | None = None
 
     def found(self) -> FoundExpanded | None:
         """Return what takes the place of windows; None where they determine nothing."""
@@ -77,8 +90,14 @@ class ExpandedEquations:
         search = SizeSearch(self._records, self._parts, self._noise, self._known)
         found = search.run(self._start)
         expansions = self.equations.expansions
-        fit = ExpandedFit(search, expansions, self.units, *found).with_errors_of_residuals()
+        unit_of_time = "s" if self.phase is None else ""
+        fit = ExpandedFit(search, expansions, self.units, *found, unit_of_time).with_errors_of_residuals()
         return FoundExpanded(self.windows, self.equations, fit, self.time, self.step)
+
+    @property
+    def _along(self) -> tuple[Array, float]:
+        """What functions of time are functions of, and by how much it grows in a second."""
+        return (self.time, 1.0) if self.phase is None else (self.phase, 1 / (self.phase.size * self.period))
 
     @property
     def _unknown(self) -> list[Element]:
@@ -95,24 +114,41 @@ class ExpandedEquations:
         )
         # A number as the core sees it.
         is_angle, is_torque, is_term = (np.abs(one) <= arguments.LARGEST for one in (angles, torques, terms))
+        alignment = self._alignment(trial[4])
         usable, samples = is_torque.copy(), angles.shape[1]
+        centres = np.ones(samples, np.bool_) if trial[3] is None else np.asarray(trial[3])
+        if alignment is not None:
+            usable &= alignment.is_inside
+            centres = centres & alignment.is_centre
         for element in self.equations.elements:
             channels = self.equations.expansions[element.name].channels if element.expansion else ()
             for equation, of, channel, _ in element.entries:
                 usable[equation] &= is_term[channel] if of is None else is_angle[channel]
                 for one in channels:
-                    usable[equation] &= np.isfinite(one[:samples])
+                    there = np.isfinite(one)
+                    usable[equation] &= there[:samples] if alignment is None else there[alignment.nearest]
         return ExpandedRecord(
             angles=np.where(is_angle, angles, 0.0),
             torques=np.where(is_torque, torques, 0.0),
             usable=usable,
-            centres=np.ones(samples, np.bool_) if trial[3] is None else trial[3],
+            centres=centres,
             period=self.period,
             half=self.windows.window_length // 2,
             exponent=self.windows.exponent,
             terms=list(np.where(is_term, terms, 0.0)),
             spread=spread_of(trial[5]),
+            alignment=alignment,
         )
+
+    def _alignment(self, positions: Array | None) -> AlignedSamples | None:
+        """Return where samples of a trial lie along the curves; trials go on into the next cycle where all functions do."""
+        if positions is None:
+            return None
+        expansions = self.equations.expansions.values()
+        is_periodic = all(
+            one.is_of_time and one.family == "fourier" and one.given_limits == ((0.0, 1.0),) for one in expansions
+        )
+        return AlignedSamples(positions, self.time.size, is_periodic)
 
     @cached_property
     def _parts(self) -> list[RecordPart]:
@@ -123,7 +159,7 @@ class ExpandedEquations:
             if expansion is None:
                 found.append(RecordPart(one.name, places))
             else:
-                found.append(part_of(one.name, places, expansion, self.time, self._rates))
+                found.append(part_of(one.name, places, expansion, self._along, self._rates))
         return found
 
     def _rates(self, channel: Array) -> tuple[Array, Array]:

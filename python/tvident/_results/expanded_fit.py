@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._expansion import (
+    ExpandedRecord,
     ExpandedUnknown,
     Expansion,
     Fitted,
@@ -23,6 +24,7 @@ from tvident._expansion import (
     along_record,
     condition_of_curves,
     curve_along,
+    curve_length,
     placed,
     reach_over,
 )
@@ -53,6 +55,8 @@ class ExpandedFit:
     fitted : Fitted
     around : Linearised
         The rows around what was found.
+    unit_of_time : str
+        Of what functions of time are functions of: empty for a phase.
     """
 
     search: SizeSearch
@@ -61,19 +65,17 @@ class ExpandedFit:
     unknowns: Sequence[ExpandedUnknown]
     fitted: Fitted
     around: Linearised
+    unit_of_time: str = "s"
 
     @property
     def samples(self) -> int:
-        """How many samples the longest record has."""
-        return max(one.samples for one in self.search.records)
+        """How many samples the curves have."""
+        return curve_length(self.search.records)
 
     @cached_property
     def usable(self) -> npt.NDArray[np.bool_]:
         """Whether an equation of a record may use a sample, shape (n,)."""
-        found = np.zeros(self.samples, np.bool_)
-        for one in self.search.records:
-            found[: one.samples] |= one.usable.any(axis=0)
-        return found
+        return self._anywhere((one, np.any(one.usable, axis=0)) for one in self.search.records)
 
     @property
     def tried(self) -> list[Tried]:
@@ -144,7 +146,7 @@ class ExpandedFit:
                 },
                 limits=limits[0] if len(limits) == 1 else limits,
                 unit=self.units.get(one.name, ""),
-                unit_of="s" if expansion.is_of_time else unit_said(expansion.of),
+                unit_of=self.unit_of_time if expansion.is_of_time else unit_said(expansion.of),
                 _basis=one.basis,
                 _own=own,
                 _own_root=root,
@@ -220,9 +222,18 @@ class ExpandedFit:
 
     def _moving(self, one: ExpandedUnknown) -> npt.NDArray[np.bool_]:
         """Return at which samples what an unknown multiplies moves in one of the records, shape (n,)."""
+        return self._anywhere(
+            (record, record.moves(one.entries, self.search.noise[0])) for record in self.search.records
+        )
+
+    def _anywhere(self, each: Iterable[tuple[ExpandedRecord, npt.NDArray[np.bool_]]]) -> npt.NDArray[np.bool_]:
+        """Return at which samples of the curves something holds in one of the records."""
         found = np.zeros(self.samples, np.bool_)
-        for record in self.search.records:
-            found[: record.samples] |= record.moves(one.entries, self.search.noise[0])
+        for record, holds in each:
+            if record.alignment is None:
+                found[: record.samples] |= holds
+            else:
+                found[record.alignment.nearest[holds & record.alignment.is_inside]] = True
         return found
 
     def covariances(self, names: Sequence[str]) -> dict[tuple[str, str], Array]:
