@@ -366,3 +366,16 @@ def test_a_chain_connects_what_there_is(links: list[Any]) -> None:
 def test_silence_determines_nothing() -> None:
     with pytest.raises(ValueError, match="force must act"):
         identify(np.ones((2, 500)), np.zeros((2, 500)), **OPTIONS)
+
+
+def test_what_varies_slowly_is_followed_in_windows() -> None:
+    made = chain([changing, constant(18.0)], 6000, seed=31)
+    options: dict[str, Any] = {**OPTIONS, "structure": tvident.Chain(2, [("base", 0), (0, 1)])}
+    found, windowed = (
+        identify(made.angle, made.torque, stiffness=[kind, "constant"], **options) for kind in ("varying", "windowed")
+    )
+    np.testing.assert_array_equal(found.stiffness, windowed.stiffness)
+    assert found.kinds == windowed.kinds
+    assert any("stiffness_base_0 varies slowly and is followed in windows" in one for one in found.reasons)
+    again = identify(made.angle, made.torque, settings=found.settings, **options)
+    np.testing.assert_allclose(again.stiffness, found.stiffness, rtol=1e-9)

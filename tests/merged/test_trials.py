@@ -255,7 +255,7 @@ def test_trials_of_several_lengths_are_aligned_on_their_phase() -> None:
         ({"instrument": np.ones((3, 400))}, "not supported"),
         ({"method": "paper"}, "WeakForm"),
         ({"dof_axis": 0}, "shape \\(trials, masses, n\\)"),
-        ({"stiffness": "varying"}, "'windowed'"),
+        ({"stiffness": "varying", "damping": tvident.Expansion("bspline")}, "stiffness='varying'; say"),
         ({"ensemble_axis": 1}, "ensemble_axis must be"),
         ({"structure": tvident.Chain(1, [("base", 0)])}, "dof_axis"),
     ],

@@ -83,9 +83,9 @@ class Element:
         return Element(self.name, self.of, kept, self.value)
 
     def given(self) -> tuple[list[Entry], float | None, str]:
-        """Return the element as the core takes it."""
+        """Return the element as the core takes it: windows follow what varies slowly, too."""
         if isinstance(self.value, str):
-            return list(self.entries), None, self.value
+            return list(self.entries), None, "windowed" if self.value == "varying" else self.value
         return list(self.entries), self.number, "constant"
 
 
@@ -104,16 +104,11 @@ def kind_or_number(name: str, value: object) -> Kind | float | Expansion:
     Raises
     ------
     ValueError
-        If it is an array, or varies slowly, which merged rows cannot follow yet.
+        If it is an array, which merged rows cannot take off yet.
     """
     if isinstance(value, Expansion):
         return value
     found = parameter(name, "auto" if value is None else value, ())
-    if found == "varying":
-        raise ValueError(
-            f"{name} must be 'windowed', 'constant', 'auto', a number or an Expansion beside ensemble_axis= and dof_axis=; got 'varying', "
-            "which is not supported there yet; use 'windowed', or a smooth function of time: tvident.Expansion('bspline')"
-        )
     if isinstance(found, np.ndarray):
         raise ValueError(  # noqa: TRY004 - arrays are known parameters elsewhere
             f"{name} must be a number where it is known, beside ensemble_axis= and dof_axis=; got an array, which is not supported there "
@@ -140,12 +135,13 @@ def check_expansions(elements: Sequence[Element], samples: int, *, has_momenta: 
     for one in expanded:
         if one.expansion is not None:
             check_expansion(one.name, one.places, one.expansion, samples)
-    windowed = [one.name for one in elements if one.value == "windowed"] if expanded else []
+    follow = [one for one in elements if isinstance(one.value, str) and one.value in {"windowed", "varying"}]
+    windowed = follow if expanded else []
     if windowed:
         refuse(
             f"beside an Expansion of {expanded[0].name} all others are constant, known or expansions",
-            f"{windowed[0]}='windowed'",
-            f"say {windowed[0]}='constant', or give an Expansion of time",
+            f"{windowed[0].name}={windowed[0].value!r}",
+            f"say {windowed[0].name}='constant', or give an Expansion of time",
         )
 
 

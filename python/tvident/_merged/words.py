@@ -47,6 +47,7 @@ def words_of(result: Any, merging: Merging, scatter: Mapping[str, float]) -> Wor
         advice += _lacking_terms(part, merging)
     advice += _changing(result)
     reasons += _tested(result)
+    reasons += _slow(merging)
     for name, factor in scatter.items():
         if factor > 1:
             differences = result.trial_spread[name][0]
@@ -60,6 +61,14 @@ def words_of(result: Any, merging: Merging, scatter: Mapping[str, float]) -> Wor
         if not verdict:
             advice.append(f"{name} cannot be known: {verdict.reason}")
     return Words(tuple(dict.fromkeys(reasons)), tuple(dict.fromkeys(advice)))
+
+
+def _slow(merging: Merging) -> list[str]:
+    """Return how elements are followed that were said to vary slowly."""
+    names = [one.name for one in merging.elements if one.value == "varying"]
+    words = "varies slowly and is" if len(names) == 1 else "vary slowly and are"
+    other = "an Expansion of time, beside constants and other expansions, knows it better"
+    return [f"{' and '.join(names)} {words} followed in windows: {other}"] if names else []
 
 
 def _without_equations(spread: Mapping[str, tuple[Any, Any]]) -> list[str]:
