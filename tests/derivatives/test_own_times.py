@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import tvident
 from parameters import examples
-from reference.own_times import fit, window_of
+from reference.own_times import fit, parts_of, window_of
 from tvident import Status, _core
 from tvident._huber import pseudo_values
 
@@ -66,6 +66,119 @@ def test_every_window_has_its_own_design(seed: int, samples: int, length: float)
         shares /= shares.sum()
         error = shares @ np.sqrt((sigma**2)[:, np.newaxis] * gains + (values - values[best]) ** 2)
         np.testing.assert_allclose(found.stderr[:, sample], error, rtol=1e-4)
+
+
+# All that such a call depends on.
+@settings(max_examples=examples(25))
+@given(
+    seed=st.integers(0, 10_000),
+    length=st.one_of(st.integers(3, 15).map(lambda half: 2 * half + 1), st.floats(0.08, 0.25)),
+    order=st.one_of(st.none(), st.integers(0, 4)),
+    max_gap=st.one_of(st.none(), st.integers(3, 12), st.just("0.03 s")),
+    span=st.sampled_from([0.0, 1.0, 4.0]),
+    lost=st.sampled_from([0.0, 0.1]),
+    unit=st.sampled_from([1.0, 1e-40, 3e250]),
+    omit=st.booleans(),
+)
+def test_every_window_is_the_weighted_least_squares_of_what_it_holds(
+    seed: int,
+    length: float,
+    order: int | None,
+    max_gap: int | str | None,
+    span: float,
+    lost: float,
+    unit: float,
+    *,
+    omit: bool,
+) -> None:
+    times, y = record(seed, 140)
+    generator = np.random.default_rng(seed + 1)
+    weights = 10 ** generator.uniform(-span / 2, span / 2, y.size)
+    weights[generator.random(y.size) < lost] = 0
+    weights[generator.integers(y.size - 20) :][:15] = 0
+    y = np.where((weights == 0) & (generator.random(y.size) < 0.5), np.nan, y)
+    if omit:
+        y[generator.random(y.size) < lost] = np.nan
+    given_length = length if isinstance(length, int) else f"{length!r} s"
+    how: dict[str, Any] = {"order": order, "max_order": 6, "max_gap": max_gap, "quantisation": 0}
+    how |= {"nan_policy": "omit" if omit else "propagate", "workers": 1}
+    found = tvident.fit_local_polynomials(y, given_length, t=times, weights=weights * unit, **how)
+    usual = np.median(np.diff(times))
+    gap = (
+        np.inf if max_gap is None else max_gap + 1.5 if isinstance(max_gap, int) else max(1, round(0.03 / usual)) + 1.5
+    )
+    there = (weights > 0) & np.isfinite(y)
+    assert (found.status[~there] == Status.INVALID | Status.GAP).all()
+    assert np.isnan(found.derivatives[:, ~there]).all()
+    for part in parts_of(times, there, gap * usual):
+        is_short = part.size < length if isinstance(length, int) else times[part[-1]] - times[part[0]] < length
+        least = max((length + 1) // 2 if isinstance(length, int) else 5, 0 if order is None else order + 1)
+        for place in range(0, part.size, 5):
+            sample = part[place]
+            window = part[window_of(times[part], place, length)]
+            assert bool(found.status[sample] & Status.GAP) == is_short
+            if window.size < least:
+                assert found.status[sample] & Status.INVALID
+                continue
+            assert not found.status[sample] & Status.INVALID
+            values, gains, residuals, scores = fit(times[window], y[window], times[sample], 2, 6, weights[window])
+            best = order
+            if best is None:
+                best = int(scores.argmin())
+                if np.sort(scores)[1:2] - scores[best] < TIE:
+                    continue
+            if best >= scores.size:
+                continue
+            assert found.order[sample] == best
+            sigma = np.sqrt(residuals / (window.size - np.arange(residuals.size) - 1))
+            assert found.sigma[sample] == pytest.approx(sigma[best] * np.sqrt(unit), rel=1e-6)
+            if order is None and found.status[sample] & Status.EDGE:
+                continue
+            errors = sigma[best] * np.sqrt(gains[best])
+            if order is None:
+                shares = np.exp(-(scores - scores[best]) / 2)
+                errors = shares / shares.sum() @ np.sqrt((sigma**2)[:, None] * gains + (values - values[best]) ** 2)
+            np.testing.assert_allclose(found.stderr[:, sample], errors, rtol=1e-4)
+            off = np.abs(found.derivatives[:, sample] - values[best])
+            assert (off <= 1e-6 * errors + SAME * np.abs(values).max(axis=0)).all()
+
+
+def test_weights_of_zero_and_one_are_samples_that_are_missing_and_there() -> None:
+    times, y = record(4, 400)
+    y = np.stack([y, y[::-1]], axis=1)
+    weights = np.where(np.random.default_rng(0).random(y.shape) < 0.1, 0.0, 1.0)
+    for length in (21, "0.12 s"):
+        holed = tvident.fit_local_polynomials(
+            np.where(weights > 0, y, np.nan), length, t=times, nan_policy="omit", axis=0
+        )
+        for factor in (1.0, 4.0):
+            found = tvident.fit_local_polynomials(y, length, t=times, weights=factor * weights, axis=0)
+            for name in ("derivatives", "stderr", "order", "status"):
+                np.testing.assert_array_equal(getattr(found, name), getattr(holed, name))
+            np.testing.assert_array_equal(found.sigma, holed.sigma * np.sqrt(factor))
+            for sample in (0, 100, 101, 399):
+                np.testing.assert_array_equal(found.scores(sample), holed.scores(sample))
+
+
+def test_weights_halve_errors_where_half_the_samples_are_noisy_and_errors_hold() -> None:
+    over, errors = [], []
+    for seed in range(12):
+        generator = np.random.default_rng(seed)
+        times = np.cumsum(generator.uniform(0.2, 1.8, 800)) / 200
+        noise = np.where(generator.random(800) < 0.5, 0.2, 0.02)
+        y = np.sin(9 * times) + noise * generator.standard_normal(800)
+        truth = np.stack([np.sin(9 * times), 9 * np.cos(9 * times), -81 * np.sin(9 * times)])
+        inner = slice(60, -60, 15)
+        for weights in (None, 1 / noise**2):
+            found = tvident.fit_local_polynomials(y, 61, t=times, max_order=6, weights=weights)
+            off = (found.derivatives - truth)[:, inner]
+            errors.append(np.sqrt(np.mean(off**2, axis=1)))
+        over.append(off / found.stderr[:, inner])
+        assert np.median(found.sigma[inner]) == pytest.approx(1, rel=0.2)
+    plain, weighted = np.mean(errors[::2], axis=0), np.mean(errors[1::2], axis=0)
+    # Weighted least squares have 0.2 of the variance's root.
+    assert (weighted < 0.5 * plain).all()
+    assert 0.9 < np.mean(np.abs(over) < 1.96) < 0.98
 
 
 def test_times_that_are_hardly_irregular_give_what_uniform_ones_do() -> None:
@@ -208,7 +321,12 @@ def test_times_too_irregular_for_a_choice_say_so() -> None:
             {"window_length": "auto", "loss": "huber"},
             "loss must be 'squares' where t is not uniform and windows are chosen",
         ),
-        ({"window_length": 21, "nan_policy": "omit", "max_gap": 3}, "max_gap and min_observations need uniform times"),
+        ({"window_length": 21, "max_gap": 3}, "max_gap must go with nan_policy='omit' or weights; got 3"),
+        ({"window_length": "auto", "nan_policy": "omit", "max_gap": 3}, "max_gap must be left out where t is not unif"),
+        ({"window_length": "auto", "weights": np.ones(100)}, "window_length must be a length where samples have weigh"),
+        ({"window_length": 21, "loss": "huber", "weights": np.ones(100)}, "loss must be 'squares' where samples have"),
+        ({"window_length": 21, "weights": np.ones(99)}, r"one value for every sample, shape \(100,\); got shape"),
+        ({"window_length": 21, "nan_policy": "omit", "min_observations": 22}, "min_observations must be at most 21"),
         ({"window_length": "9 s"}, "less than or equal to the length of the record; got 9 s for a record of"),
         ({"window_length": 20}, "window_length must be odd"),
         ({"window_length": 5, "order": 7}, "order must be less than window_length"),

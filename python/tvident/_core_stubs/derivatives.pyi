@@ -104,6 +104,8 @@ class WindowFit:
         criterion: str,
         derivatives: int,
         quantisation: float,
+        weights: npt.NDArray[np.float64] | None = None,
+        least: int = 5,
     ) -> WindowFit: ...
     def estimate(
         self,

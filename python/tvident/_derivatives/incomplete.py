@@ -68,26 +68,44 @@ def incomplete_given(
     axis: int,
 ) -> Incomplete | None:
     """Return what is left out, as it was asked for; None where windows are to be whole."""
-    if nan_policy != "omit" and weights is None:
-        for name, value in (("max_gap", max_gap), ("min_observations", min_observations)):
-            if value is not None:
-                raise ValueError(
-                    f"{name} must go with nan_policy='omit' or weights; got {value!r} with {nan_policy!r}; give one of them, or no {name}"
-                )
+    if not leaves_out(nan_policy, weights, max_gap, min_observations):
         return None
     longest = longest_gap(max_gap, period)
     least = (length + 1) // 2
     if min_observations is not None:
-        least = arguments.whole_number("min_observations", min_observations, least=_FEWEST, most=length)
-    given, is_one = None, False
-    if weights is not None:
-        is_one = arguments.any_array("weights", weights).ndim == 1
-        given = arguments.weights("weights", weights, (shape[axis],) if is_one else shape)
-    if given is not None:
-        leading = [extent for place, extent in enumerate(shape) if place != axis % len(shape)]
-        last = given if is_one else np.moveaxis(given, axis, -1)
-        given = np.broadcast_to(last, (*leading, shape[axis]))
+        least = least_given(min_observations, length)
+    given = None if weights is None else weights_along(weights, shape, axis)
     return Incomplete(nan_policy == "omit", given, length // 2 if longest is None else longest, least)
+
+
+def leaves_out(
+    nan_policy: str, weights: npt.ArrayLike | None, max_gap: int | str | None, min_observations: int | None
+) -> bool:
+    """Return whether samples may be left out; refuse what is said of gaps where they may not."""
+    if nan_policy == "omit" or weights is not None:
+        return True
+    for name, value in (("max_gap", max_gap), ("min_observations", min_observations)):
+        if value is not None:
+            raise ValueError(
+                f"{name} must go with nan_policy='omit' or weights; got {value!r} with {nan_policy!r}; give one of them, or no {name}"
+            )
+    return False
+
+
+def least_given(min_observations: int, most: int | None) -> int:
+    """Return the samples that a window must hold, which it has at most so many of."""
+    return arguments.whole_number("min_observations", min_observations, least=_FEWEST, most=most)
+
+
+def weights_along(weights: npt.ArrayLike, shape: tuple[int, ...], axis: int) -> Array | None:
+    """Return the weight of every sample of records of a shape, time last; weights are one for all records, or of each."""
+    is_one = arguments.any_array("weights", weights).ndim == 1
+    given = arguments.weights("weights", weights, (shape[axis],) if is_one else shape)
+    if given is None:
+        return None
+    leading = [extent for place, extent in enumerate(shape) if place != axis % len(shape)]
+    last = given if is_one else np.moveaxis(given, axis, -1)
+    return np.broadcast_to(last, (*leading, shape[axis]))
 
 
 def longest_gap(max_gap: int | str | None, period: float) -> int | None:

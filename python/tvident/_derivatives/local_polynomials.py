@@ -15,7 +15,7 @@ from tvident._derivatives.automatic_gaps import choose_beside_gaps
 from tvident._derivatives.fit import LocalPolynomialFit, Sampled, unit_of_samples
 from tvident._derivatives.found import Found
 from tvident._derivatives.incomplete import check_weighted, filled, incomplete_given, left_out, longest_gap
-from tvident._derivatives.own_times import at_own_times, check_plain, period_or_times
+from tvident._derivatives.own_times import at_own_times, left_out_of_own_times, period_or_times
 from tvident._derivatives.plans import HIGHEST_ORDER, SHORTEST_WINDOW, plan, quantisation_step
 from tvident._derivatives.robust import robust, value_in
 from tvident._tables import shaped
@@ -103,13 +103,15 @@ def fit_local_polynomials(
     nan_policy : {"propagate", "omit", "raise"}, optional
         ``"propagate"``: windows that contain a value that is not finite are NaN, and no others. ``"omit"``: they are fitted on what is
         there (status GAP), each with an order of its own, and estimates go on across short gaps; all other windows keep their bits.
-        Where `t` is not uniform windows are made of the samples that are there, and at missing ones there is no estimate. ``"raise"``:
-        raise an error.
+        Where `t` is not uniform windows are made of the samples that are there, also of those with a weight, and at the others there is
+        no estimate. ``"raise"``: raise an error.
     max_gap : int or str, optional
         With ``"omit"`` or weights: samples, or a duration. Longer gaps split the record: nothing is estimated in them, and windows end
-        there as at the ends of a record. By default half a window.
+        there as at the ends of a record. By default half a window. Where `t` is not uniform a gap is a step of time, so many usual steps
+        (their median) longer than one of them, whether samples are missing there or not; by default none splits the record.
     min_observations : int, optional
-        Samples that a window must hold with ``"omit"`` or weights, at least 3; by default half a window.
+        Samples that a window must hold with ``"omit"`` or weights, at least 3; by default half a window, and 5 in windows of a duration
+        where `t` is not uniform.
     quantisation : float, optional
         Step to which `y` was rounded, in its unit: an encoder's count, a converter's last bit. By default it is estimated from
         the samples: the step of which all differences of neighbours are multiples, the smallest one of all records. 0 means none.
@@ -131,8 +133,7 @@ def fit_local_polynomials(
         `y` spans more than one and a half of `period`, or if a name is unknown. With ``"auto"``, if the record has fewer than 64
         samples, if no order reaches `max_deriv`, or if `criterion` or `selection` is given. With `weights`, if orders are pooled or
         averaged, or the loss is Huber's; with `weights` or `min_observations`, and with Huber's loss where `t` is not uniform, if the
-        window is ``"auto"``. Where `t` is not uniform, if orders are pooled or averaged, or with `weights`, `max_gap` or
-        `min_observations`.
+        window is ``"auto"``. Where `t` is not uniform, if orders are pooled or averaged, or with `max_gap` if the window is ``"auto"``.
     TypeError
         If `y` is complex or holds no numbers, or a number is not whole.
 
@@ -173,7 +174,7 @@ def fit_local_polynomials(
     order without its bias: nominal 95 % intervals cover 84 to 96 %. ``"pooled"`` and ``"average"`` need uniform times. A window of
     51 to 2001 samples takes 0.15 to 0.8 µs with AVX2, where `step` is far below its length and at most five derivatives are asked for:
     neighbours share one basis. Standard errors take 0.2 to 0.9 µs, when they are asked for. At the ends, near gaps and outliers each is
-    decomposed on its own, in some 20 µs with 201 samples.
+    decomposed on its own, in some 20 µs with 201 samples, as all are where weights differ.
 
     The cost is about 15 ns a sample and thread for any window length on a processor with AVX-512, about twice that with AVX2; averaged
     about twice as much; pooled about 300 ns, because the orders of every window need logarithms; ``"auto"`` about 5 µs a sample and
@@ -252,7 +253,17 @@ def fit_local_polynomials(
         choose, plan_of_window=plan_of_window, max_order=max_order, order=order, workers=threads
     )
     if times is not None:
-        check_plain(weights, max_gap, min_observations, selection=selection)
+        left = left_out_of_own_times(
+            nan_policy,
+            weights,
+            max_gap,
+            min_observations,
+            shape=array.shape,
+            axis=axis,
+            window_length=window_length,
+            selection=selection,
+            loss=loss,
+        )
         found = at_own_times(
             samples,
             times,
@@ -263,7 +274,7 @@ def fit_local_polynomials(
             criterion=criterion,
             max_deriv=max_deriv,
             loss=arguments.one_of("loss", loss, get_args(Loss)),
-            omit=nan_policy == "omit",
+            left=left,
             quantisation=step_of_rounding,
             step=every,
             workers=threads,

@@ -6,7 +6,7 @@ use numpy::{IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArray, P
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use tvident::exec::workers as threads;
-use tvident::irregular::{WindowFit as Core, WindowFits, WindowSpan};
+use tvident::irregular::{FEWEST, WindowFit as Core, WindowFits, WindowSpan};
 use tvident::local_polynomials::Order;
 
 use crate::arrays::zeros;
@@ -32,7 +32,7 @@ pub(crate) struct WindowFit {
 #[pymethods]
 impl WindowFit {
     #[new]
-    #[pyo3(signature = (times, window_length, *, order, max_order, criterion, derivatives, quantisation))]
+    #[pyo3(signature = (times, window_length, *, order, max_order, criterion, derivatives, quantisation, weights=None, least=FEWEST))]
     fn new(
         times: &Bound<'_, PyUntypedArray>,
         window_length: &Bound<'_, PyAny>,
@@ -41,6 +41,8 @@ impl WindowFit {
         criterion: &str,
         derivatives: usize,
         quantisation: f64,
+        weights: Option<&Bound<'_, PyUntypedArray>>,
+        least: usize,
     ) -> PyResult<Self> {
         let span = match window_length.extract::<usize>() {
             Ok(samples) => WindowSpan::Samples(samples),
@@ -52,7 +54,11 @@ impl WindowFit {
         if times.is_empty() {
             return Err(PyValueError::new_err("there is no time"));
         }
-        Ok(Self { core: Core { times, span, order, derivatives, quantisation } })
+        let weights = weights.map(values).transpose()?;
+        if weights.as_ref().is_some_and(|weights| weights.len() != times.len()) {
+            return Err(PyValueError::new_err("weights and times must be as many as each other"));
+        }
+        Ok(Self { core: Core { times, span, order, derivatives, quantisation, weights, least } })
     }
 
     /// Estimates along the last axis, and the standard errors of the derivatives where they are asked for.

@@ -1,5 +1,7 @@
 //! What is asked of windows whose samples have times of their own, and where what is found in them goes.
 
+use std::ops::Range;
+
 use crate::irregular::window_places::WindowSpan;
 use crate::local_polynomials::options::Order;
 use crate::status::Status;
@@ -17,6 +19,10 @@ pub struct WindowFit {
     pub derivatives: usize,
     /// Step of the samples' quantisation, or zero.
     pub quantisation: f64,
+    /// Weight of every sample, above zero: one over the variance of its noise, relative to the others. Without, all count alike.
+    pub weights: Option<Vec<f64>>,
+    /// Samples that a window must hold.
+    pub least: usize,
 }
 
 /// Where what is found in some windows goes, one after the other.
@@ -30,11 +36,19 @@ pub struct WindowFits<'a> {
     pub order: &'a mut [u8],
     /// Bits of [`Status`].
     pub status: &'a mut [u16],
-    /// Standard deviation of the noise.
+    /// Standard deviation of the noise of a sample of weight 1.
     pub sigma: &'a mut [f64],
 }
 
 impl WindowFit {
+    /// The root of the greatest weight of some samples, and the roots of all over it; 1 and nothing where all count alike.
+    pub(crate) fn roots_of_weights(&self, samples: Range<usize>) -> (f64, Option<Vec<f64>>) {
+        let Some(weights) = &self.weights else { return (1.0, None) };
+        let some = &weights[samples];
+        let greatest = some.iter().copied().fold(0.0, f64::max);
+        (greatest.sqrt(), Some(some.iter().map(|weight| (weight / greatest).sqrt()).collect()))
+    }
+
     /// The status of a window of which an order was taken.
     pub(crate) fn status(&self, order: usize, degrees: usize, edge: bool, exact: bool) -> Status {
         let mut status = if edge { Status::EDGE } else { Status::GOOD };

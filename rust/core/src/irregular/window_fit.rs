@@ -50,6 +50,8 @@ struct FittedWindow {
     residuals: Vec<f64>,
     floor: f64,
     reference: f64,
+    /// Root of the weight that residuals are those of.
+    unit: f64,
 }
 
 impl WindowFit {
@@ -66,7 +68,8 @@ impl WindowFit {
         watch: &mut Watch<'_>,
     ) -> Result<(), Error> {
         let count = record.len().div_ceil(step);
-        let lengths = if can_share(1, self.derivatives) { LENGTHS } else { 0 };
+        let shares = self.weights.is_none() && can_share(1, self.derivatives);
+        let lengths = if shares { LENGTHS } else { 0 };
         let usual = self.usual_length().max(1);
         let most = (MOST_SAMPLES / usual).min(count.div_ceil(PIECES));
         let at_once = WINDOWS.max((lengths * usual / step).min(most));
@@ -132,7 +135,8 @@ impl WindowFit {
         let table = |length: usize| tables[length].as_deref().expect("made for every window");
         let degrees = |length: usize| {
             let degrees = table(length).degrees;
-            (length >= FEWEST && can_share(degrees, self.derivatives)).then_some(degrees)
+            let shares = self.weights.is_none() && length >= FEWEST.max(self.least);
+            (shares && can_share(degrees, self.derivatives)).then_some(degrees)
         };
         let mut groups = groups(&self.times, record, placed, degrees);
         groups.sort_by_key(|group| group.degrees);
@@ -198,21 +202,29 @@ impl WindowFit {
         let range = window.placed.samples.clone();
         let (samples, length) = (&record[range.clone()], range.len());
         let candidates = OrderTable::new(self.order, length).degrees;
-        if length < FEWEST || candidates == 0 || !samples.iter().all(|&value| is_usable(value)) {
+        if length < self.least || candidates == 0 || !samples.iter().all(|&value| is_usable(value)) {
             return None;
         }
+        let (unit, roots) = self.roots_of_weights(range.clone());
         let times: Vec<f64> = self.times[range].iter().map(|time| (time - window.middle) / window.half).collect();
-        basis.make(&times, candidates);
+        basis.make(&times, roots.as_deref(), candidates);
         let reference = samples[length / 2];
         let mut left: Vec<f64> = samples.iter().map(|value| value - reference).collect();
+        if let Some(roots) = &roots {
+            left.iter_mut().zip(roots).for_each(|(value, root)| *value *= root);
+        }
         let energy = dot(&left, &left);
         let coefficients = basis.project(&mut left);
+        if roots.is_some() && matches!(self.order, Order::Fixed(order) if order >= coefficients.len()) {
+            return None;
+        }
         let mut residuals = vec![dot(&left, &left); coefficients.len()];
         for order in (0..coefficients.len() - 1).rev() {
             residuals[order] = residuals[order + 1] + coefficients[order + 1].powi(2);
         }
-        let quantised = length as f64 * self.quantisation * self.quantisation / 12.0;
-        Some(FittedWindow { coefficients, residuals, floor: quantised.max(ROUNDING * energy), reference })
+        let count = roots.as_ref().map_or(length as f64, |roots| dot(roots, roots));
+        let floor = (count * self.quantisation * self.quantisation / 12.0).max(ROUNDING * energy);
+        Some(FittedWindow { coefficients, residuals, floor, reference, unit })
     }
 
     /// Writes the estimates of a window that was fitted alone, whose basis is the last that was made.
@@ -263,7 +275,7 @@ impl WindowFit {
         let exact = fitted.residuals[order] <= fitted.floor;
         fits.order[place] = u8::try_from(order).unwrap_or(u8::MAX);
         fits.status[place] = self.status(order, degrees, edge, exact).bits();
-        fits.sigma[place] = variance(order).sqrt();
+        fits.sigma[place] = variance(order).sqrt() * fitted.unit;
     }
 }
 
@@ -303,7 +315,7 @@ mod tests {
     ];
 
     fn plan(times: Vec<f64>, span: WindowSpan, order: Order) -> WindowFit {
-        WindowFit { times, span, order, derivatives: 2, quantisation: 0.0 }
+        WindowFit { times, span, order, derivatives: 2, quantisation: 0.0, weights: None, least: FEWEST }
     }
 
     /// What was found in windows.

@@ -81,8 +81,11 @@ impl WindowSpan {
                 let before = |from: usize, is_before: &dyn Fn(f64) -> bool| {
                     from + times[from..].iter().take_while(|&&time| is_before(time)).count()
                 };
-                let begin = before(begin, &|time| time < middle - half);
-                let end = before(end.max(begin), &|time| time <= middle + half);
+                // At the record's ends its first and last sample are in the window, whatever rounding makes of its own ends.
+                let is_first = middle <= times[0] + half;
+                let begin = if is_first { 0 } else { before(begin, &|time| time < middle - half) };
+                let is_last = middle >= times[count - 1] - half;
+                let end = if is_last { count } else { before(end.max(begin), &|time| time <= middle + half) };
                 PlacedWindow { samples: begin..end, edge: (middle - times[sample]).abs() > 0.0 }
             }
         }
