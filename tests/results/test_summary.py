@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import tvident
 from tvident import recordings
 from tvident._arguments import percent
-from tvident._results.held_back import HeldBack
+from tvident._results.held_back import HeldBack, without_masked
 
 RATE = 1000.0
 TIME = np.arange(4000) / RATE
@@ -261,6 +263,50 @@ def test_what_a_mask_leaves_out_is_not_held_back(lengths: tuple[float, float]) -
         found = tvident.identify(*channels, sample_rate=1000, mask=masks).held_back()
         for name in ("simulated", "predicted"):
             assert np.ravel(getattr(found, name)) == pytest.approx(getattr(alone, name), abs=0.1)
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    shape=st.sampled_from([(), (1,), (3,), (2, 2)]),
+    kept=st.sampled_from([0.5, 0.9, 0.98]),
+    window=st.integers(1, 40),
+)
+def test_parts_are_without_what_is_left_out_of_all_records(
+    seed: int, shape: tuple[int, ...], kept: float, window: int
+) -> None:
+    generator = np.random.default_rng(seed)
+    samples = 200
+    mask = np.repeat(generator.random((*shape, samples // 5)) < kept, 5, axis=-1)
+    ends = np.sort(generator.choice(samples + 1, 7, replace=False)).tolist()
+    parts = list(zip(ends[:5], ends[1:6], ends[2:], strict=True))
+    # One sample after the other: one that any record keeps is no place where something else acts on all.
+    out = [not any(one[place] for one in mask.reshape(-1, samples)) for place in range(samples)]
+    expected = []
+    for begin, first, end in parts:
+        start, stop = first, first
+        while start > begin and not out[start - 1]:
+            start -= 1
+        while stop < end and not out[stop]:
+            stop += 1
+        if stop > first and first - start >= min(window, first - begin):
+            expected.append((start, first, stop))
+    assert without_masked(parts, mask, window) == (expected or parts)
+    assert without_masked(parts, None, window) == parts
+
+
+def test_what_a_mask_leaves_out_of_one_record_is_not_compared_there() -> None:
+    """Records of a batch were touched at other times: each is explained as well as alone."""
+    rig = tvident.simulate_torsional_rig(20.0, seed=3, angle_noise=1e-3)
+    touched = [(rig.time >= begin) & (rig.time < begin + 3) for begin in (3, 11)]
+    masks = [~np.convolve(one, np.ones(201), "same").astype(bool) for one in touched]
+    angles = [rig.angle + np.where(one, rig.angle.std() * np.sin(9 * rig.time), 0) for one in touched]
+    pairs = zip(angles, masks, strict=True)
+    alone = [tvident.identify(one, rig.torque, sample_rate=1000, mask=mask).held_back() for one, mask in pairs]
+    found = tvident.identify(
+        np.stack(angles), np.stack([rig.torque] * 2), sample_rate=1000, mask=np.stack(masks)
+    ).held_back()
+    for name in ("simulated", "predicted"):
+        assert getattr(found, name) == pytest.approx([getattr(one, name) for one in alone], abs=0.1)
 
 
 def test_where_a_mask_leaves_no_part_all_parts_count() -> None:
