@@ -202,7 +202,7 @@ def test_what_cannot_be_aligned_is_said() -> None:
     refused: list[tuple[dict[str, Any], str]] = [
         ({}, "t=(t, t), which"),
         ({"velocity": angle}, "resample it"),
-        ({"weights": t}, "resample it"),
+        ({"weights": t}, "t=(t, t), which"),
     ]
     for others, cure in refused:
         with pytest.raises(ValueError, match=rf"one in every 2 only, .*; .*{re.escape(cure)}"):

@@ -1,7 +1,7 @@
 """Brings channels whose times are not uniform onto a uniform grid, and says what was done."""
 
 from tvident._clocks.clock import Clock, Evened, clock_of
-from tvident._clocks.grid import Grid, grid_of, in_no_gap
+from tvident._clocks.grid import Grid, grid_of, in_no_gap, weights_on_grid
 from tvident._clocks.held import holds_that_stay, unheld
 from tvident._clocks.missing import Bridged, bridged
 from tvident._clocks.passed import Passed
@@ -24,4 +24,5 @@ __all__ = [
     "in_no_gap",
     "two_clocks",
     "unheld",
+    "weights_on_grid",
 ]

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
-from tvident._clocks.grid import Grid
+from tvident._clocks.grid import Grid, weights_on_grid
 from tvident._clocks.missing import LEAST_BRIDGED, bridge_of
 from tvident._clocks.order import chosen_order, longest_bridged
 from tvident._clocks.passed import Passed
@@ -113,6 +113,10 @@ class Evened:
         grid = np.arange(self.time.size, dtype=np.float64)
         found = [np.interp(grid, self.places, row) for row in rows.reshape(-1, rows.shape[-1])]
         return np.reshape(found, (*rows.shape[:-1], grid.size))
+
+    def weights(self, given: Numbers, *, propagate: bool) -> Numbers:
+        """Return weights on the grid; where missing values propagate, those beside samples without any are zero."""
+        return weights_on_grid(self.places, given, self.time.size, left_out=propagate)
 
     def mask(self, mask: npt.NDArray[np.bool_] | None) -> npt.NDArray[np.bool_] | None:
         """Return where on the grid the samples on both sides may be used."""

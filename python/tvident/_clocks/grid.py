@@ -27,6 +27,9 @@ _FEW_TIMES = 1 << 12
 _MOST_GRID = 10
 """Samples of the grid for each that was recorded, at most: beyond, the record is mostly gaps."""
 
+_LEAST_WEIGHT = 1e-100
+"""Of the greatest weight: variances stay within the range of doubles."""
+
 _UNIFORM = math.sqrt(6.0)
 """Times that lie anywhere within a step have steps that scatter by the step over this."""
 
@@ -86,9 +89,42 @@ class Grid:
 
 def in_no_gap(places: Numbers, wanted: Numbers, longest: float) -> npt.NDArray[np.bool_]:
     """Return which wanted places lie between samples that are no farther apart than the longest step that is no gap."""
-    left = np.clip(np.searchsorted(places, wanted, side="right") - 1, 0, places.size - 1)
-    right = np.clip(np.searchsorted(places, wanted, side="left"), 0, places.size - 1)
+    left, right = _neighbours(places, wanted)
     return np.asarray(places[right] - places[left] <= longest)
+
+
+def weights_on_grid(places: Numbers, weights: Numbers, samples: int, *, left_out: bool) -> Numbers:
+    """Return weights at the samples of a grid: one over the variance along a straight line between the samples that count.
+
+    Parameters
+    ----------
+    places : ndarray, shape (n,)
+        Where samples lie on the grid.
+    weights : ndarray, shape (*, n)
+        One over the variance of a sample's noise; zero of samples that do not count.
+    samples : int
+        Of the grid.
+    left_out : bool
+        Beside samples that do not count nothing counts; what is missing there is known to be left out.
+    """
+    grid = np.arange(samples, dtype=np.float64)
+    rows = weights.reshape(-1, weights.shape[-1])
+    found = np.zeros((rows.shape[0], samples))
+    for row, one in zip(rows, found, strict=True):
+        there = row > 0
+        if not there.any():
+            continue
+        one[:] = 1 / np.interp(grid, places[there], 1 / np.maximum(row[there], _LEAST_WEIGHT * row.max()))
+        if left_out:
+            left, right = _neighbours(places, grid)
+            one[~(there[left] & there[right])] = 0
+    return found.reshape(*weights.shape[:-1], samples)
+
+
+def _neighbours(places: Numbers, wanted: Numbers) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Return the last sample at or before every wanted place, and the first at or after it."""
+    left = np.clip(np.searchsorted(places, wanted, side="right") - 1, 0, places.size - 1)
+    return left, np.clip(np.searchsorted(places, wanted, side="left"), 0, places.size - 1)
 
 
 def grid_of(times: Numbers) -> Grid:

@@ -188,7 +188,8 @@ def identify(
     weights : array_like, shape (n,) or the angle's, optional
         Weight of every sample, not negative: one over the variance of the noise of its angle and torque, relative to the others. Samples
         of weight 0 are missing, whatever they hold, and a masked weight is 0. A factor of all weights changes nothing: noise and
-        residuals are those of a sample of mean weight. See Notes.
+        residuals are those of a sample of mean weight. Where angle and torque have clocks of their own, they are those of the samples of
+        either, and say how large the noise of both is at that time. See Notes.
     loss : {"squares", "huber", "auto"}, optional
         ``"squares"``: least squares. ``"huber"``: residuals of the torque's samples beyond 2.5 standard deviations count linearly, so that
         spikes of few samples move parameters by little, however large they are (Huber 1981, modified residuals): the torque that the
@@ -261,7 +262,8 @@ def identify(
     With weights w, an equation has the weight of the noise of its torque: in strong form that of its sample, in weak form, where an
     equation sums 2N + 1 samples times φ, Σφ² / Σ(φ²/w). So weights matter where they differ over stretches longer than the test function:
     among equations that all hold some good and some bad samples there is nothing to choose. Polynomials of the strong form count samples
-    alike. That the noise of angle and torque is larger where weights are smaller is taken from you; errors are those of such noise.
+    alike. That the noise of angle and torque is larger where weights are smaller is taken from you; errors are those of such noise. Where
+    samples are brought onto a grid, the variance of its samples lies on straight lines between those of samples that count.
 
     Standard errors of the strong form follow from the scatter between windows that share no equation: see :class:`Identification`. Those
     of the weak form follow from the covariance of its overlapping rows, which the noise determines, times the cross-validation error

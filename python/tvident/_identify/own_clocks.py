@@ -12,9 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._clocks import Passed, TwoClocks, in_no_gap, two_clocks
+from tvident._clocks import Grid, Passed, TwoClocks, in_no_gap, two_clocks, weights_on_grid
 from tvident._identify.aligned import Align, Aligned, Late, aligned
 from tvident._identify.data import Data
+from tvident._identify.weighted import Weights, weights_of
 from tvident._units import scaled
 
 _LOOKED_AT = 1 << 10
@@ -68,11 +69,50 @@ class OwnClocks:
     align: Align
     propagate: bool
 
-    def channels(self, policy: str) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        """Return angle and torque on the grid, by their stamps; a policy for missing values refuses those of the recording."""
-        for name, recorded in zip(("angle", "torque"), self.recorded, strict=True):
-            arguments.check_nan(name, recorded, policy, arguments.RowPolicy)
+    def channels(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """Return angle and torque on the grid, by their stamps."""
         return self._angle()[0], self._torque((0.0, 0.0))[0]
+
+    def weighted(self, given: Any, earlier: Mapping[str, Any] | None, policy: str) -> tuple[OwnClocks, Weights | None]:
+        """Return the same without samples that have no weight, and the weights on the grid.
+
+        Parameters
+        ----------
+        given : array_like, optional
+            Weights of the samples of the angle, or of the torque: of the noise of both channels at their times.
+        earlier : mapping, optional
+            Settings of an earlier result, whose alignment is taken where none is asked for.
+        policy : str
+            For missing values: it refuses those of the recording that have a weight.
+        """
+        weights, counted = None, [np.ones(one.shape, np.bool_) for one in self.recorded]
+        if given is not None:
+            of_torque = np.shape(given)[-1:] == self.recorded[1].shape != self.recorded[0].shape
+            found = weights_of(given, self.recorded[of_torque].shape)
+            assert found is not None  # noqa: S101 - they were given
+            late = self._late_by(earlier)
+            if late is None:
+                raise ValueError(
+                    f"weights need a torque whose times are right; got align={self.align!r}; find the offset without weights, and give it "
+                    "in seconds: align=0.01, say"
+                )
+            each = (self._places(self.clocks.angle, (0.0, 0.0)), self._places(self.clocks.torque, late))
+            own = each[of_torque]
+            # Samples of the other channel have the weight of the one that is nearest to them.
+            nearest = [np.rint(np.interp(one, own, np.arange(own.size))).astype(np.intp) for one in each]
+            counted = [found.given[one] > 0 for one in nearest]
+            on_grid = weights_on_grid(own, found.given, self.clocks.samples, left_out=self.propagate)
+            weights = Weights(on_grid)
+        angle, torque = zip(self.recorded, counted, strict=True)
+        for name, (recorded, counts) in (("angle", angle), ("torque", torque)):
+            arguments.check_nan(name, np.where(counts, recorded, 0), policy, arguments.RowPolicy)
+        if weights is None:
+            return self, None
+        return replace(self, recorded=(_without(*angle), _without(*torque))), weights
+
+    def _places(self, own: Grid, late: Late) -> npt.NDArray[np.float64]:
+        """Return where on the grid the samples of a clock lie, whose stamps are late."""
+        return (self.clocks.true_times(own, late) - self.clocks.start) / self.clocks.period
 
     def known(self, values: Any, earlier: Mapping[str, Any] | None, *, over_gaps: bool = True) -> Any:
         """Return what is known at every sample of the angle, or of the torque, on the grid along straight lines; else as it is.
@@ -166,6 +206,11 @@ class OwnClocks:
 
     def _torque(self, late: Late) -> tuple[npt.NDArray[np.float64], Passed | None]:
         return self.clocks.on_grid(self.clocks.torque, self.recorded[1], late, propagate=self.propagate)
+
+
+def _without(recorded: npt.NDArray[np.number], counts: npt.NDArray[np.bool_]) -> npt.NDArray[np.number]:
+    """Return a channel without the samples that do not count."""
+    return recorded if counts.all() else np.where(counts, recorded, np.nan)
 
 
 def _late(align: object) -> float:

@@ -32,7 +32,7 @@ from tvident._identify.signals import (
 )
 from tvident._identify.task import Task
 from tvident._identify.together import sampled
-from tvident._identify.weighted import Weights, usable_channels, weights_of
+from tvident._identify.weighted import check_alone, usable_channels, weights_of
 from tvident._units import (
     ROTARY,
     Axis,
@@ -81,18 +81,18 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         propagate=call["nan_policy"] == "propagate",
         by_angle=is_strong(call["method"], call["settings"]) or _has_expansions(call),
     )
-    torque = call["torque"]
+    torque, weighted = call["torque"], None
     if clocks is not None:
-        measured["angle"], torque = clocks.channels(call["nan_policy"])
+        clocks, weighted = clocks.weighted(call["weights"], call["settings"], call["nan_policy"])
+        measured["angle"], torque = clocks.channels()
         sampling = {"sample_rate": 1 / clocks.clocks.period, "delta": None, "t": None}
     *arrays, torques = arguments.channels(**measured, torque=torque)
     channels = dict(zip(measured, arrays, strict=True))
-    samples = torques.shape[-1]
     channels = {name: scaled(values, _factor_of(name, call[name], axis)) for name, values in channels.items()}
     torques = scaled(torques, axis.torque)
     seconds, grid, begin = _sampling(sampling, axis, call["time_unit"], first, next(iter(channels.values())))
     if clocks is None:
-        others = any(one is not None for one in (*beside_clocks.values(), call["weights"]))
+        others = any(one is not None for one in beside_clocks.values())
         check_every_sample({**channels, "torque": torques}, seconds, others=others, in_parts="wanted" in call)
     instruments = instrument_of(call["instrument"], torques.shape)
     request = resolve(
@@ -104,9 +104,10 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         has_instrument=instruments is not None,
     )
     asked = loss_of(call["loss"], call["settings"])
-    beside = {"uneven times": grid, "a clock of the torque": clocks, "loss": asked != "squares" or None}
-    weighted = _weights(call, torques.shape, beside)
-    channels, torques = usable_channels(channels, torques, weighted, call["nan_policy"])
+    _check_beside_weights(call, request, asked)
+    weighted = weights_of(call["weights"], torques.shape) if clocks is None else weighted
+    # What two clocks recorded was checked before; on the grid their gaps are no samples.
+    channels, torques = usable_channels(channels, torques, weighted, call["nan_policy"] if clocks is None else "omit")
     doubts: list[tuple[int, str]] = []
     turn = request.period
     if turn is not None:
@@ -120,8 +121,9 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         torques,
         instruments,
         arguments.mask("mask", call["mask"], torques.shape),
-        even_times(samples, seconds, begin),
+        even_times(torques.shape[-1], seconds, begin),
         seconds,
+        weighted,
     )
     if grid is not None:
         signals, request = signals.on_grid(
@@ -155,7 +157,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         axis=axis,
         clock=signals.clock,
         passed=(signals.passed.get(next(iter(measured))), signals.passed.get("torque")),
-        weights=weighted,
+        weights=signals.weights,
         wanted=None if isinstance(request.form, StrongForm) else call.get("wanted"),
     )
     if clocks is not None:
@@ -173,6 +175,13 @@ def _on_clocks(request: Request, clocks: OwnClocks | None, earlier: Mapping[str,
         return request
     known = partial(clocks.known, earlier=earlier)
     return with_known(request, known, partial(known, over_gaps=False))
+
+
+def _check_beside_weights(call: Mapping[str, Any], request: Request, loss: str) -> None:
+    """Refuse what does not go with weights, where there are any."""
+    if call["weights"] is not None:
+        beside = {name: call[name] for name in ("velocity", "acceleration", "instrument")}
+        check_alone({**beside, "loss": loss != "squares" or None})
 
 
 def _has_expansions(call: Mapping[str, Any]) -> bool:
@@ -193,12 +202,6 @@ def _equation(call: Mapping[str, Any], axis: Axis) -> dict[str, Any]:
         "quantisation": _in_units_of_results("quantisation", call["quantisation"], axis.angle),
         "period": _in_units_of_results("period", call["period"], axis.angle),
     }
-
-
-def _weights(call: Mapping[str, Any], shape: tuple[int, ...], beside: Mapping[str, Any]) -> Weights | None:
-    """Return the weights of samples, unless something is given that they do not go with."""
-    arguments_beside = {name: call[name] for name in ("velocity", "acceleration", "instrument", "align")}
-    return weights_of(call["weights"], shape, {**arguments_beside, **beside})
 
 
 def _lag_left(request: Request, data: Data) -> tuple[float, float]:

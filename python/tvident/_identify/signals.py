@@ -15,6 +15,7 @@ from tvident._derivatives import quantisation_step
 from tvident._equation import has_kind
 from tvident._expansion import Expansion
 from tvident._identify.settings import Request
+from tvident._identify.weighted import Weights
 
 _Channels = Mapping[str, npt.NDArray[np.number]]
 
@@ -34,6 +35,8 @@ class Signals:
         Seconds.
     period : float
         Seconds from one sample to the next.
+    weights : Weights, optional
+        Those of samples, where they were given.
     clock : Timed, optional
         How they were brought onto a grid, or their gaps bridged; None where neither was.
     passed : mapping of str to Passed
@@ -48,6 +51,7 @@ class Signals:
     mask: npt.NDArray[np.bool_] | None
     time: npt.NDArray[np.float64]
     period: float
+    weights: Weights | None = None
     clock: Timed | None = None
     passed: Mapping[str, Passed] = field(default_factory=dict)
     doubts: Sequence[tuple[int, str]] = ()
@@ -74,6 +78,7 @@ class Signals:
             evened.mask(self.mask),
             evened.time,
             clock.period,
+            self.weights and Weights(evened.weights(self.weights.given, propagate=propagate)),
             clock,
             {} if evened.passed is None else dict.fromkeys(recorded, evened.passed),
             [(record, clock.doubt) for record in range(records) if clock.doubt],

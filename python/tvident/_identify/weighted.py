@@ -80,31 +80,28 @@ class Weights:
         return Weights(self.given[place])
 
 
-def weights_of(given: npt.ArrayLike | None, shape: tuple[int, ...], beside: Mapping[str, Any]) -> Weights | None:
-    """Return weights of records of some shape, or None.
+def check_alone(beside: Mapping[str, Any]) -> None:
+    """Refuse what does not go with weights: anything of some arguments that was given."""
+    for name, value in beside.items():
+        if value is not None:
+            raise ValueError(
+                f"weights need one angle and one torque, and least squares; got {name} beside them; leave one of them out: samples that "
+                "are not to count at all may be NaN"
+            )
 
-    Parameters
-    ----------
-    given : array_like, optional
-    shape : tuple of int
-    beside : mapping of str to object
-        Arguments that do not go with weights, as they were given.
+
+def weights_of(given: npt.ArrayLike | None, shape: tuple[int, ...]) -> Weights | None:
+    """Return weights of records of some shape, or None.
 
     Raises
     ------
     ValueError
-        If weights are no weights of the samples, or something is given that they do not go with.
+        If weights are no weights of the samples.
     TypeError
         If they are no numbers.
     """
     if given is None:
         return None
-    for name, value in beside.items():
-        if value is not None:
-            raise ValueError(
-                f"weights need one angle and one torque at the same uniform times, and least squares; got {name} beside them; leave one of "
-                "them out: samples that are not to count at all may be NaN"
-            )
     is_one = arguments.any_array("weights", given).ndim == 1
     found = np.broadcast_to(_checked(given, shape[-1:] if is_one else shape), shape)
     with np.errstate(under="ignore"):

@@ -41,7 +41,7 @@ pub fn passed_noise(
     let noises: Vec<Vec<f64>> = (0..records).map(|record| white(record, samples)).collect();
     let slices: Vec<&[f64]> = noises.iter().map(Vec::as_slice).collect();
     let passed = resampling.onto_grid(&slices, workers, watch)?;
-    let shown: Vec<Shown> = passed.iter().map(|record| shown(&record.as_slice(), instructions)).collect();
+    let shown: Vec<Shown> = passed.iter().map(|record| shown(&record.as_slice(), None, instructions)).collect();
     Ok(PassedNoise { shown: Shown::mean(&shown), gain: gain(resampling, workers, watch)? })
 }
 
@@ -135,7 +135,7 @@ mod tests {
             let (resampling, passed) = passed(jitter, order);
             let own: Vec<f64> = white(6, 30_000).iter().map(|value| 0.1 * value).collect();
             let record = resampling.onto_grid(&[&own], NonZeroUsize::MIN, &mut |_, _| true).unwrap().remove(0);
-            let found = variance_after(Some(&passed), &record.as_slice(), Some(0.0), Instructions::current());
+            let found = variance_after(Some(&passed), &record.as_slice(), None, Some(0.0), Instructions::current());
             assert!((found / (0.01 * passed.gain) - 1.0).abs() < 0.08, "{jitter} {order}: {found}");
         }
     }

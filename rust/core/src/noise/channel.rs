@@ -121,21 +121,22 @@ pub(crate) fn rounding_variance(quantisation: f64, weights: Option<&[f64]>) -> f
     mean * quantisation * quantisation / 12.0
 }
 
-/// The same of a channel that was resampled: what white noise must have had that became what the channel shows, and its density at low frequencies.
+/// The same of a channel that may have been resampled: what white noise must have had that became what the channel shows, and its density at low frequencies.
 #[must_use]
 pub fn variance_after(
     passed: Option<&PassedNoise>,
     record: &dyn Samples,
+    weights: Option<&[f64]>,
     quantisation: Option<f64>,
     instructions: Instructions,
 ) -> f64 {
-    let Some(passed) = passed else { return channel_variance(record, quantisation, instructions) };
-    let variance = shown(record, instructions).over(&passed.shown);
+    let Some(passed) = passed else { return weighted_variance(record, weights, quantisation, instructions) };
+    let variance = shown(record, weights, instructions).over(&passed.shown);
     if variance.is_nan() {
         return 0.0;
     }
     let quantisation = quantisation.unwrap_or(0.0);
-    passed.gain * variance.max(rounding_variance(quantisation, None)).max((f64::EPSILON * largest(record)).powi(2))
+    passed.gain * variance.max(rounding_variance(quantisation, weights)).max((f64::EPSILON * largest(record)).powi(2))
 }
 
 /// The noise of a channel that was resampled: that of [`variance_after`], and its quantisation where that is not given.
@@ -149,14 +150,15 @@ pub fn noise_after(
     instructions: Instructions,
 ) -> Result<Noise, Error> {
     enough_samples(record)?;
-    let sigma = variance_after(Some(passed), record, quantisation, instructions).sqrt();
+    let sigma = variance_after(Some(passed), record, None, quantisation, instructions).sqrt();
     Ok(Noise { sigma, quantisation: quantisation.unwrap_or_else(|| quantisation_step(record)) })
 }
 
-/// What a channel shows where its signal does not reach, or hardly.
-pub(crate) fn shown(record: &dyn Samples, instructions: Instructions) -> Shown {
-    let of = |half: usize| if 2 * half < record.len() { variance(record, half, None, instructions) } else { f64::NAN };
-    let (bands, powers) = bands(record, None);
+/// What a channel shows where its signal does not reach, or hardly, of a sample of weight one.
+pub(crate) fn shown(record: &dyn Samples, weights: Option<&[f64]>, instructions: Instructions) -> Shown {
+    let of =
+        |half: usize| if 2 * half < record.len() { variance(record, half, weights, instructions) } else { f64::NAN };
+    let (bands, powers) = bands(record, weights);
     Shown { variances: HALVES.map(of).to_vec(), bands, powers }
 }
 

@@ -79,7 +79,7 @@ pub fn scan_windows(
 fn cycle(motion: &Motion<'_>, options: &PolynomialOptions, stages: &mut Stages<'_, '_>) -> Result<f64, Error> {
     let samples = motion.angle.len();
     let quantisation = (options.quantisation > 0.0).then_some(options.quantisation);
-    let noise = variance_after(motion.measured.passed[0], motion.angle, quantisation, options.instructions);
+    let noise = variance_after(motion.measured.passed[0], motion.angle, None, quantisation, options.instructions);
     let evidence = Evidence {
         power: power_in_pieces(motion.angle, None, spectrum_length(samples, 200), stages)?,
         samples,

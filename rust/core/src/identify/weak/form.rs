@@ -23,7 +23,7 @@ use crate::identify::weak::pulses::{add_pulses, allow_hidden, are_the_same, with
 use crate::identify::weak::session::{Session, always_constant};
 use crate::identify::weak::torque_jumps::without_jumps;
 use crate::noise::breaks::search::{Broken, breaks};
-use crate::noise::channel::{rounding_variance, variance_after, weighted_variance};
+use crate::noise::channel::{rounding_variance, variance_after};
 use crate::noise::defects::{Defect, Within, defects};
 use crate::noise::passed::PassedNoise;
 use crate::noise::quantisation::quantisation_step;
@@ -280,10 +280,7 @@ fn identify(
     ];
     let pieces = channels.map(|channel| Piece { size: samples, content: channel });
     let level = |(channel, given, step, passed): (_, Option<f64>, _, _), (): &mut ()| {
-        given.unwrap_or_else(|| match record.weights {
-            Some(weights) => weighted_variance(channel, Some(weights), step, options.instructions),
-            None => variance_after(passed, channel, step, options.instructions),
-        })
+        given.unwrap_or_else(|| variance_after(passed, channel, record.weights, step, options.instructions))
     };
     let levels = stages.map(pieces.into(), || (), level)?;
     settled(record, (options, whole), [levels[0], levels[1]], stages)
