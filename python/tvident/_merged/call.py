@@ -21,7 +21,7 @@ from tvident._merged.merging import Merging, Part
 from tvident._merged.predicted import Equations
 from tvident._merged.recorded import MergedRecorded
 from tvident._merged.result import MergedIdentification
-from tvident._merged.sampling import Sampling, mean_variance, variances
+from tvident._merged.sampling import Sampling, variance_in_trials
 from tvident._merged.trials import Trials
 
 Numbers = npt.NDArray[np.number]
@@ -196,8 +196,8 @@ def identify_trials(trials: Trials, asked: AskedTogether, term_values: TermValue
         given.append((angle[np.newaxis], torque[np.newaxis], terms, mask, position, weights))
     passed, noise = asked.sampling.passed, trials.noise
     if passed is not None:
-        angles, torques = ([mean_variance(variances(one, passed), one)] for one in (trials.angles, trials.torques))
-        noise = angles, torques
+        own = trials.weights or [None] * len(given)
+        noise = [variance_in_trials(trials.angles, own, passed)], [variance_in_trials(trials.torques, own, passed)]
     merging = Merging(
         elements,
         [asked.part(Equations(elements, [0], given), trials.samples, noise, is_white=trials.noise is None)],

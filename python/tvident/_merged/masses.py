@@ -19,9 +19,9 @@ from tvident._merged.merging import Merging, Part
 from tvident._merged.predicted import Equations, TrialArrays
 from tvident._merged.recorded import MergedRecorded
 from tvident._merged.result import MergedIdentification
-from tvident._merged.sampling import Sampling, variances
+from tvident._merged.sampling import Sampling, variance_in_trials
 from tvident._merged.structure import Chain, matrices
-from tvident._merged.weighted import spread, without_missing
+from tvident._merged.weighted import without_missing
 from tvident._units import scaled
 
 Numbers = npt.NDArray[np.number]
@@ -114,20 +114,21 @@ class Masses:
         return [*self.angles, *self.momenta]
 
     def noise(
-        self, channels: Sequence[int], equations: Sequence[int], passed: Passed | None
+        self, trials: Sequence[Masses], channels: Sequence[int], equations: Sequence[int], passed: Passed | None
     ) -> tuple[list[float], list[float]] | None:
         """Return the variances of the noise of some channels and torques; None where they are to be estimated.
 
-        That of momenta is not known, and smoothness says nothing of it: they are functions of smooth velocities.
+        They are means over trials: from one to the next channels jump. That of momenta is not known, and smoothness says nothing of it:
+        they are functions of smooth velocities.
         """
         if self.variances is not None:
             known = list(self.variances[: len(self.angles)])
             torques = [self.variances[len(self.angles) + one] for one in equations]
         elif self.momenta or passed is not None:
-            of_weight_one = 1 / spread(self.weights)
-            known = [one * of_weight_one for one in variances(self.angles, passed)]
-            measured = variances([np.asarray(self.torques[one]) for one in equations], passed)
-            torques = [one * of_weight_one for one in measured]
+            weights = [one.weights for one in trials]
+            of_trials = zip(*(one.angles for one in trials), strict=True)
+            known = [variance_in_trials(each, weights, passed) for each in of_trials]
+            torques = [variance_in_trials([one.torques[mass] for one in trials], weights, passed) for mass in equations]
         else:
             return None
         return [known[one] if one < len(known) else 0.0 for one in channels], torques
@@ -297,7 +298,7 @@ def identify_masses(trials: Sequence[Masses], asked: AskedTogether, term_values:
         channels = [*equations, *(one for one in range(len(joined.channels)) if one not in equations)]
         inside = [_rewired(one, {channel: place for place, channel in enumerate(channels)}) for one in inside]
         given = [_recorded(one, equations, channels, names, term_values) for one in several]
-        noise = joined.noise(channels, equations, asked.sampling.passed)
+        noise = joined.noise(trials, channels, equations, asked.sampling.passed)
         is_white = joined.variances is None or bool(joined.momenta)
         parts.append(asked.part(Equations(inside, equations, given), samples, noise, len(parts), is_white=is_white))
     if asked.earlier is not None:

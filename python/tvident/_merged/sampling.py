@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._clocks import Clock, Grid, Passed, Timed, clock_of
+from tvident._merged.weighted import spread
 
 Numbers = npt.NDArray[np.number]
 
@@ -111,6 +112,27 @@ def mean_variance(found: Sequence[float], channels: Sequence[Numbers]) -> float:
     """Return the mean of variances that channels of several trials tell, by their samples; 0 where none tells any."""
     told = {place: np.isfinite(channels[place]).sum() for place, one in enumerate(found) if np.isfinite(one)}
     return float(np.average([found[place] for place in told], weights=list(told.values()))) if told else 0.0
+
+
+def variance_in_trials(
+    channels: Sequence[Numbers | None], weights: Sequence[npt.NDArray[np.float64] | None], passed: Passed | None
+) -> float:
+    """Return the variance of a channel's noise of a sample of weight one: the mean of trials, from one to the next of which it jumps.
+
+    Parameters
+    ----------
+    channels : sequence of ndarray, shape (n,), or None
+        None where a trial lacks it.
+    weights : sequence of ndarray, shape (n,), or None
+        Of the samples of each trial.
+    passed : Passed, optional
+    """
+    there = [
+        (np.asarray(one), spread(weight)) for one, weight in zip(channels, weights, strict=True) if one is not None
+    ]
+    each = [channel for channel, _ in there]
+    found = [one / by for one, (_, by) in zip(variances(each, passed), there, strict=True)]
+    return mean_variance(found, each)
 
 
 def _variance(channel: Numbers, noise: _core.PassedNoise | None) -> float:
