@@ -72,8 +72,8 @@ def test_whatever_is_asked_together_is_right_or_refused(channels: Any, trials: b
         options = {**time, **beside, "structure": given}
         options |= {"ensemble_axis": 0 if trials else None, "dof_axis": int(trials) if masses else None}
         case = (trials, masses, structure, *options)
-        # Neither goes with times that are not uniform.
-        uneven = "t" in time and (trials or masses) and bool({"phase", "weights"} & set(beside))
+        # It does not go with times that are not uniform.
+        uneven = "t" in time and (trials or masses) and "phase" in beside
         if refused(trials, masses, structure, beside) or uneven:
             with pytest.raises(ValueError, match=r"got .*; .") as error:
                 identify(angle, torque, **options)

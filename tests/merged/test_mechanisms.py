@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import tvident
-from merged.simulated import double_pendulum
+from merged.simulated import double_pendulum, noisy
 
 identify: Any = tvident.identify
 """Its type is that of a single record."""
@@ -72,6 +72,21 @@ def test_a_double_pendulum_has_the_factors_that_it_was_made_with(seed: int) -> N
     assert np.median(np.abs(found.inertia / moving - 1)) < 0.003
     with pytest.raises(ValueError, match="linear equations"):
         _ = found.modes
+
+
+def test_weights_go_with_times_that_jitter() -> None:
+    one = double_pendulum(6000, seed=1)
+    loud, rng = np.arange(6000) >= 3000, np.random.default_rng(5)
+    torque = np.where(loud, noisy(rng, one.torque, 0.5), one.torque)
+    weights = np.where(loud, 0.03**2 / (0.03**2 + 0.5**2), 1.0)
+    call: dict[str, Any] = {"structure": pendulum(), **FRICTION}
+    plain, found = (identify(one.angle, torque, t=one.time, weights=each, **call) for each in (None, weights))
+    quiet = identify(one.angle[:, ~loud], torque[:, ~loud], t=one.time[~loud], **call)
+    for name, true in one.factors.items():
+        value, error = found.constants[name]
+        assert abs(value - true) < 4 * error, name
+        assert error < 0.5 * plain.constants[name][1], name
+        assert error < 1.2 * quiet.constants[name][1], name
 
 
 def test_the_double_pendulum_that_was_recorded(folder_of_recordings: Path) -> None:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.interpolate import make_interp_spline
 
 import tvident
 from merged.simulated import chain, noisy, simulated
@@ -160,6 +161,72 @@ def test_weights_of_masses(*, structure: bool) -> None:
         value, error = found.constants[name]
         assert abs(value - 18) < 4 * error
         assert error < 0.8 * plain.constants[name][1]
+
+
+def at_own_times(seed: int, jitter: float, trials: int = 6) -> tuple[Any, Array, Array, Array, Array]:
+    """Give a rig, times that jitter, and angles, torques and weights of trials of which some or parts have ten times the noise."""
+    rng, samples = np.random.default_rng(seed), 1500
+    times = np.sort(np.arange(samples) + 5 + jitter * rng.uniform(-0.5, 0.5, samples)) / 1000
+    loud = np.zeros((trials, samples), bool)
+    loud[0], loud[1:, 400:900] = True, True
+    angles, torques = np.empty(loud.shape), np.empty(loud.shape)
+    for trial in range(trials):
+        rig = tvident.simulate_torsional_rig(
+            1.52, sample_rate=4000, seed=100 * seed + trial, pattern="constant", torque_snr_db=200, angle_noise=0
+        )
+        for found, channel, level in ((angles, rig.true_angle, 1e-3), (torques, rig.true_torque, 3e-2)):
+            values = make_interp_spline(rig.time, channel, k=7)(times)
+            deviation = level * values.std() * np.where(loud[trial], 10, 1)
+            found[trial] = values + deviation * rng.standard_normal(samples)
+    return rig, times, angles, torques, np.where(loud, 0.01, 1.0)
+
+
+@pytest.mark.parametrize("jitter", [0.3, 1.0])
+@pytest.mark.parametrize("seed", [1, *long(2, 3, 4)])
+def test_weights_go_with_times_that_jitter(seed: int, jitter: float) -> None:
+    rig, times, angles, torques, weights = at_own_times(seed, jitter)
+    call: dict[str, Any] = {"t": times, "ensemble_axis": 0, **CONSTANT}
+    plain, found = (identify(angles, torques, weights=one, **call) for one in (None, weights))
+    for name in ("inertia", "stiffness"):
+        # Seeds 1 to 6: errors fall to .22 and .25, and are 1.01 and 1.12 standard errors.
+        value, error = found.constants[name]
+        assert abs(value - getattr(rig, name)[0]) < 4 * error
+        assert error < 0.5 * plain.constants[name][1]
+    assert not found.record_status
+    alike = identify(angles, torques, weights=np.full(times.size, 3.0), **call)
+    np.testing.assert_array_equal(alike.stiffness, plain.stiffness)
+    none = np.where(np.arange(times.size) // 20 == 35, 0.0, 1.0)
+    left_out = identify(angles, np.where(none > 0, torques, np.inf), weights=none, nan_policy="raise", **call)
+    missing = identify(*(np.where(none > 0, one, np.nan) for one in (angles, torques)), **call)
+    np.testing.assert_array_equal(left_out.stiffness, missing.stiffness)
+
+
+def test_weights_of_trials_of_masses_go_with_times_that_jitter() -> None:
+    # Two masses that do not touch, and a first trial with ten times the noise.
+    rng = np.random.default_rng(1)
+    times = np.sort(np.arange(1500) + 5 + rng.uniform(-0.5, 0.5, 1500)) / 1000
+    each = []
+    for seed in (100, 101, 102, 200, 201, 202):
+        rig = tvident.simulate_torsional_rig(
+            1.52, sample_rate=4000, seed=seed, pattern="constant", torque_snr_db=200, angle_noise=0
+        )
+        each.append([make_interp_spline(rig.time, one, k=7)(times) for one in (rig.true_angle, rig.true_torque)])
+    clean = np.array(each).reshape(2, 3, 2, times.size).transpose(2, 1, 0, 3)
+    loud = np.array([10.0, 1.0, 1.0])[:, np.newaxis, np.newaxis]
+    angles, torques = (
+        one + loud * level * one.std() * rng.standard_normal(one.shape)
+        for one, level in zip(clean, (1e-3, 3e-2), strict=True)
+    )
+    weights = np.broadcast_to(loud[:, 0] ** -2, (3, times.size))
+    structure = tvident.Chain(masses=2, springs=[("base", 0), ("base", 1)], dampers=[("base", 0), ("base", 1)])
+    call: dict[str, Any] = {"t": times, "ensemble_axis": 0, "dof_axis": 1, "structure": structure, **CONSTANT}
+    plain, found = (identify(angles, torques, weights=one, **call) for one in (None, weights))
+    quiet = identify(angles[1:], torques[1:], **call)
+    for name in ("inertia_0", "stiffness_base_1"):
+        value, error = found.constants[name]
+        assert abs(value - getattr(rig, name.split("_")[0])[0]) < 4 * error
+        assert error < 0.5 * plain.constants[name][1]
+        assert 0.8 < error / quiet.constants[name][1] < 1.1
 
 
 @pytest.mark.parametrize(

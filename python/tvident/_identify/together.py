@@ -306,11 +306,6 @@ def _sampling(options: Options, axis: Axis, angles: Sequence[Numbers], torques: 
                 f"t must be uniform beside trials of different lengths; got {min(lengths)} to {max(lengths)} samples and steps that "
                 "scatter; resample each trial"
             ) from None
-        if options.weights is not None:
-            raise ValueError(
-                "weights need uniform times beside ensemble_axis= and dof_axis=; got steps that scatter; resample, or leave by mask= out "
-                "what is not to count"
-            ) from None
         return Sampling.of_grid(grid_of(error.times), angles, torques, workers)
     return Sampling(period, arguments.begin_of(times))
 

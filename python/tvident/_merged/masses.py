@@ -137,7 +137,8 @@ class Masses:
         """Return the masses with their channels on a uniform grid."""
         torques = [None if one is None else sampling.channel(one) for one in self.torques]
         mask = None if self.mask is None else sampling.mask(self.mask)
-        return replace(self, angles=[sampling.channel(one) for one in self.angles], torques=torques, mask=mask)
+        angles = [sampling.channel(one) for one in self.angles]
+        return replace(self, angles=angles, torques=torques, mask=mask, weights=sampling.weights(self.weights))
 
     @property
     def measured(self) -> list[int]:

@@ -101,6 +101,12 @@ class Sampling:
         found = self.clock.evened({}, propagate=False, workers=self.workers).mask(mask)
         return mask if found is None else found
 
+    def weights(self, weights: npt.NDArray[np.float64] | None) -> npt.NDArray[np.float64] | None:
+        """Return the weights of samples on the grid, where there are any."""
+        if self.clock is None or weights is None:
+            return weights
+        return self.clock.evened({}, propagate=False, workers=self.workers).weights(weights, propagate=False)
+
 
 def variances(channels: Sequence[Numbers], passed: Passed | None) -> list[float]:
     """Return the variance of the noise of every channel; NaN of those that are too short to tell, or of which too little is there."""

@@ -82,7 +82,8 @@ class Trials:
             )
         angles, torques = ([sampling.channel(one) for one in each] for each in (self.angles, self.torques))
         masks = None if self.masks is None else [sampling.mask(one) for one in self.masks]
-        return replace(self, angles=angles, torques=torques, masks=masks, samples=angles[0].size)
+        weights = None if self.weights is None else [sampling.weights(one) for one in self.weights]
+        return replace(self, angles=angles, torques=torques, masks=masks, samples=angles[0].size, weights=weights)
 
 
 def trials_of(angle: Any, torque: Any, axis: int, *, phase: Any = None, mask: Any = None) -> Trials:
