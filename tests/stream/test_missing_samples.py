@@ -175,9 +175,6 @@ def test_samples_of_a_stream_all_have_weights_or_none_has() -> None:
     strict.push([np.nan, 1.0], [np.nan, 1.0], weights=[0.0, 1.0])
     with pytest.raises(ValueError, match="sample 2 is nan"):
         strict.push([np.nan], [1.0], weights=[1.0])
-    weak = tvident.identify(ANGLE, TORQUE, sample_rate=1000)
-    with pytest.raises(ValueError, match="weights in a stream are for the strong form"):
-        tvident.IdentificationStream(sample_rate=1000, settings=weak.settings).push(1.0, 1.0, weights=1.0)
 
 
 @pytest.mark.parametrize("value", [1e160, np.nan])

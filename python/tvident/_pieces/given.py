@@ -96,6 +96,9 @@ class Given:
                     "chosen": [one for one in chosen["chosen"] if one == "lag"],
                 },
             )
+            if self.weighted:
+                # It is that of a sample of the record's mean weight, which is not that of a part.
+                settings.pop("shown_noise", None)
         units: dict[str, Any] = {} if self.axis.system is ROTARY else {"angle_unit": "m", "torque_unit": "N"}
         return {
             "delta": self.period,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final, Protocol
 
@@ -151,19 +151,9 @@ class InWeakForm:
     half_life: float
 
     def begun(self, step: int, state: Any, *, weighted: bool = False) -> StreamWork:
-        """Return the work that begins, or goes on from a state.
-
-        Raises
-        ------
-        ValueError
-            If samples have weights.
-        """
-        if weighted:
-            raise ValueError(
-                "weights in a stream are for the strong form; got some in weak form, which goes by settings of an earlier result; give a "
-                "method of the strong form, or leave them out"
-            )
-        return WeakStream(self.given, self.equation.names, step, self.half_life, state)
+        """Return the work that begins, or goes on from a state."""
+        given = replace(self.given, weighted=weighted)
+        return WeakStream(given, self.equation.names, step, self.half_life, state)
 
 
 def asked_of(

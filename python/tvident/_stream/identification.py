@@ -15,7 +15,7 @@ from tvident._equation import LINEAR_UNITS, UNITS, GivenTerm, Parameter
 from tvident._identify import MOST_OF_FIRST, Method
 from tvident._pieces import Given
 from tvident._status import Status
-from tvident._stream.asked import StreamWork, asked_of
+from tvident._stream.asked import InWeakForm, StreamWork, asked_of
 from tvident._stream.pieces import SampleStream, is_plain
 from tvident._stream.streamed import Named, StreamedIdentification
 from tvident._stream.weak import WeakStream
@@ -72,8 +72,8 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
     delay : int
         Samples from one to its parameters. In strong form half a window of the polynomials, half of the span of windows that are
         reached from one start, and half a regression window where parameters are windowed. In weak form twice the sum of the window and
-        four regression windows, less one. With ``nan_policy="omit"`` or weights, samples within half a window of the polynomials and
-        the longest gap that is followed must have come.
+        four regression windows, less one. In strong form, with ``nan_policy="omit"`` or weights, samples within half a window of the
+        polynomials and the longest gap that is followed must have come.
     samples : int
         Samples that have come so far.
     names : list of str
@@ -271,7 +271,7 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
             The next samples, any number of them.
         weights : float or array_like, shape (m,), optional
             Weight of every sample, one over the variance of its noise relative to the others, as in :func:`identify`; a sample of weight 0
-            is missing. In strong form; samples of a stream all have weights, or none has. With the first ones :attr:`delay` may grow.
+            is missing. Samples of a stream all have weights, or none has. In strong form :attr:`delay` may grow with the first ones.
 
         Returns
         -------
@@ -282,7 +282,7 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         ------
         ValueError
             If the stream has ended, lengths differ, a channel holds what is no number where `nan_policy` is ``"raise"``, a weight is
-            negative, no finite number or 1e100 times the first, or only some samples have weights.
+            negative, no finite number or in strong form 1e100 times the first, or only some samples have weights.
         TypeError
             If an array is complex or holds no numbers.
 
@@ -332,7 +332,9 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
         return StreamedIdentification(self._stream.push(angle, torque, relative), self._named)
 
     def _relative(self, weights: Numbers) -> tuple[float, Numbers]:
-        """Return the first weight that is not zero, 0 before there is one, and weights over it."""
+        """Return the first weight that is not zero, 0 before there is one, and weights over it; blocks have each its own unit."""
+        if isinstance(self._asked, InWeakForm):
+            return 1.0, weights
         unit = self._unit
         if unit == 0.0 and weights.any():
             unit = float(weights[np.argmax(weights > 0)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -64,8 +65,8 @@ class State:
     ----------
     first : int
         Number of the first sample that is held.
-    held : ndarray, shape (2, m)
-        Angle and torque.
+    held : ndarray, shape (2, m) or (3, m)
+        Angle and torque, and weights where samples have any.
     samples, done : int
         Samples that have come, and those whose parameters are known.
     given : int
@@ -106,7 +107,7 @@ class WeakStream:
     Parameters
     ----------
     given : Given
-        Of the equation, with settings that leave nothing to be chosen.
+        Of the equation, with settings that leave nothing to be chosen, and whether samples have weights.
     names : sequence of str
         Unknowns.
     step : int
@@ -117,6 +118,7 @@ class WeakStream:
 
     def __init__(self, given: Given, names: Sequence[str], step: int, half_life: float, state: State | None) -> None:
         self._given, self._names, self._step, self._half_life = given, names, step, half_life
+        self._channels = 3 if given.weighted else 2
         settings = given.settings or {}
         ahead = self._least = look_ahead(settings)
         self._near, self._reach = max(_LEAST_REACH, ahead), reach_of(settings)
@@ -127,13 +129,13 @@ class WeakStream:
         self._state = state if state is not None else self._empty()
         self._begin, held = self._state.first, self._state.held
         # As much as a block and its neighbours, twice: so moving samples costs less than taking them in.
-        self._buffer = np.empty((2, 2 * (self._reach + self._step + self._block + self._after)))
+        self._buffer = np.empty((self._channels, 2 * (self._reach + self._step + self._block + self._after)))
         self._buffer[:, : held.shape[1]] = held
 
     def _empty(self) -> State:
         return State(
             0,
-            np.empty((2, 0)),
+            np.empty((self._channels, 0)),
             0,
             0,
             0,
@@ -181,7 +183,6 @@ class WeakStream:
         weights: npt.NDArray[np.float64] | None = None,
     ) -> BlockParameters:
         """Take the next samples, and return the parameters that are due."""
-        assert weights is None  # noqa: S101 - a stream in weak form has none
         state, taken = self._state, 0
         found: list[Columns] = []
         while taken < angle.size:
@@ -190,6 +191,8 @@ class WeakStream:
             place = self._place(count)
             self._buffer[0, place : place + count] = angle[taken : taken + count]
             self._buffer[1, place : place + count] = torque[taken : taken + count]
+            if weights is not None:
+                self._buffer[2, place : place + count] = weights[taken : taken + count]
             state.samples, taken = state.samples + count, taken + count
             if state.samples == full:
                 found.append(self._worked(state.done + self._block))
@@ -229,6 +232,7 @@ class WeakStream:
             state.done = end
             return self._nothing(len(range(0, end, self._step)))
         columns, note = part_estimated(found, span, wanted, self._step)
+        columns["residual_std"] = columns["residual_std"] * self._root(span)
         if not self._hold and state.done >= state.counted_from:
             state.gathered.add(self._counted(note, span, wanted), 0.5 ** ((end - state.done) / self._half_life))
         means = dict.fromkeys(note["constants"], NOTHING_SAID) | state.gathered.means()
@@ -255,9 +259,18 @@ class WeakStream:
 
     def _estimated(self, span: Span, wanted: Span, *, diagnose: bool) -> Estimates:
         """Identify some of the samples that are held."""
-        angle, torque = self._buffer[:, span[0] - self._begin : span[1] - self._begin]
-        held, chosen = Held(angle, torque, [span]), self._given.settings
+        angle, torque, *weights = self._buffer[:, span[0] - self._begin : span[1] - self._begin]
+        held, chosen = Held(angle, torque, [span], *weights), self._given.settings
         return self._given.estimated(held, chosen=chosen, step=self._step, wanted=wanted, diagnose=diagnose)
+
+    def _root(self, span: Span) -> float:
+        """Return what deviations of residuals are multiplied by: those of a sample of mean weight become those of weight one."""
+        weights = self._buffer[2:, span[0] - self._begin : span[1] - self._begin]
+        counted = weights[weights > 0]
+        if not counted.size:
+            return 1.0
+        greatest = float(counted.max())
+        return math.sqrt(greatest) * math.sqrt(float(np.mean(counted / greatest)))
 
     def _nothing(self, count: int) -> Columns:
         """Return columns without numbers."""
