@@ -104,6 +104,7 @@ def _part(data: Data, part: int, parts: int) -> Data:
         motion=replace(data.motion, angles=angles),
         time=data.time[some],
         mask=None,
+        weights=None if data.weights is None else data.weights.part((..., some)),
         labels=None,
     )
 

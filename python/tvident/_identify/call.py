@@ -189,7 +189,8 @@ def identify(
         Weight of every sample, not negative: one over the variance of the noise of its angle and torque, relative to the others. Samples
         of weight 0 are missing, whatever they hold, and a masked weight is 0. A factor of all weights changes nothing: noise and
         residuals are those of a sample of mean weight. Where angle and torque have clocks of their own, they are those of the samples of
-        either, and say how large the noise of both is at that time. See Notes.
+        either, and say how large the noise of both is at that time; where `align` is to find an offset, those of the angle, and above 0.
+        See Notes.
     loss : {"squares", "huber", "auto"}, optional
         ``"squares"``: least squares. ``"huber"``: residuals of the torque's samples beyond 2.5 standard deviations count linearly, so that
         spikes of few samples move parameters by little, however large they are (Huber 1981, modified residuals): the torque that the

@@ -91,11 +91,13 @@ class OwnClocks:
             found = weights_of(given, self.recorded[of_torque].shape)
             assert found is not None  # noqa: S101 - they were given
             late = self._late_by(earlier)
-            if late is None:
+            if late is None and (of_torque or not (found.given > 0).all()):
+                got = "weights of the torque's samples" if of_torque else "some of zero"
                 raise ValueError(
-                    f"weights need a torque whose times are right; got align={self.align!r}; find the offset without weights, and give it "
-                    "in seconds: align=0.01, say"
+                    f"weights must be those of the angle's samples, and above zero, where its clock is to be aligned with the torque's; "
+                    f"got {got} and align={self.align!r}; find the offset without them, and give it in seconds: align=0.01, say"
                 )
+            late = late or (0.0, 0.0)
             each = (self._places(self.clocks.angle, (0.0, 0.0)), self._places(self.clocks.torque, late))
             own = each[of_torque]
             # Samples of the other channel have the weight of the one that is nearest to them.
