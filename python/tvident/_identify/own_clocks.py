@@ -87,6 +87,10 @@ class OwnClocks:
         """
         weights, counted = None, [np.ones(one.shape, np.bool_) for one in self.recorded]
         if given is not None:
+            if _is_pair("t", given):
+                raise ValueError(
+                    "weights must be those of the samples of one channel, for the noise of both; got two arrays; give one of them"
+                )
             of_torque = np.shape(given)[-1:] == self.recorded[1].shape != self.recorded[0].shape
             found = weights_of(given, self.recorded[of_torque].shape)
             assert found is not None  # noqa: S101 - they were given
