@@ -104,7 +104,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         has_instrument=instruments is not None,
     )
     asked = loss_of(call["loss"], call["settings"])
-    _check_beside_weights(call, request, asked)
+    _check_beside_weights(call, asked)
     weighted = weights_of(call["weights"], torques.shape) if clocks is None else weighted
     # What two clocks recorded was checked before; on the grid their gaps are no samples.
     channels, torques = usable_channels(channels, torques, weighted, call["nan_policy"] if clocks is None else "omit")
@@ -177,7 +177,7 @@ def _on_clocks(request: Request, clocks: OwnClocks | None, earlier: Mapping[str,
     return with_known(request, known, partial(known, over_gaps=False))
 
 
-def _check_beside_weights(call: Mapping[str, Any], request: Request, loss: str) -> None:
+def _check_beside_weights(call: Mapping[str, Any], loss: str) -> None:
     """Refuse what does not go with weights, where there are any."""
     if call["weights"] is not None:
         beside = {name: call[name] for name in ("velocity", "acceleration", "instrument")}
