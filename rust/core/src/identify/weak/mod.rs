@@ -7,6 +7,7 @@ pub(crate) mod decide;
 pub(crate) mod decided;
 pub(crate) mod form;
 pub(crate) mod found;
+pub(crate) mod freed;
 pub(crate) mod friction;
 pub(crate) mod jumps;
 pub(crate) mod jumps_of_constants;

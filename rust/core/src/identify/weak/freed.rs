@@ -1,0 +1,193 @@
+//! Setting constants free: those that grow, that swing, or that all change beside one that does.
+
+use std::borrow::Cow;
+
+use crate::equation::rows::Rows;
+use crate::error::Error;
+use crate::identify::weak::decide::{BADLY, BETTER};
+use crate::identify::weak::decided::Decided;
+use crate::identify::weak::session::Session;
+use crate::inference::short_parts::{Swinging, swinging};
+use crate::inference::slowly_varying;
+use crate::regression::fit::Fit;
+use crate::regression::model::Model;
+
+/// The part of the mean squared error of predicting rows that must be left where no test of parts says that anything changes.
+const FAR_BETTER: f64 = 0.5;
+/// The same where rows are predicted well and another changes: of constants that are set free beside it for nothing .96 is left at least.
+const A_LITTLE_BETTER: f64 = 0.9;
+
+/// The part of what noise does not explain of rows that may be left where a constant that swings is set free: it is .02 to .11 where one swings, .28 to
+/// .35 where a friction or a drag is missing.
+const LEFT_OF_SWINGS: f64 = 0.2;
+
+/// The same after the first round of a search, from which on it is not worth another.
+const HOPELESS: f64 = 0.5;
+
+/// Where constants jump, those that do not change in between stand unless others predict so much better.
+const SIMPLER: f64 = 0.98;
+
+impl Session<'_, '_, '_> {
+    /// Sets the constant free that seems to grow most where rows are predicted badly, if that leaves far less, or else the one that swings most, if that
+    /// leaves hardly more than noise: whatever is missing from an equation follows a curve a little. Returns whether it was. One that was given as
+    /// constant is contradicted.
+    pub(crate) fn set_unsteady_free(
+        &mut self,
+        rows: &Rows,
+        model: &Model,
+        decided: &mut Decided,
+    ) -> Result<bool, Error> {
+        let Some(fit) = decided.fit.as_ref().filter(|fit| fit.scale.is_some()) else { return Ok(false) };
+        if !decided.slow.is_empty() {
+            return Ok(false);
+        }
+        let growing = if decided.error < BADLY { None } else { self.growing(rows, decided, fit)? };
+        let swinging = self.swinging(rows, decided)?;
+        decided.longest = swinging.as_ref().and_then(|one| one.longest);
+        if let Some(growing) = growing {
+            let free = self.freed(rows, model, decided, (growing, f64::INFINITY))?;
+            if free.error < FAR_BETTER * decided.error {
+                *decided = free;
+                return Ok(true);
+            }
+        }
+        let Some(Swinging { constant, test, .. }) = swinging else { return Ok(false) };
+        let swinging = decided.model.constant[constant];
+        let is_open = self.undecided().contains(&swinging);
+        let rows = if is_open { Cow::Borrowed(rows) } else { Cow::Owned(without_rate(rows, swinging)) };
+        let hopeless = 1.0 + HOPELESS * (decided.error - 1.0).max(0.0);
+        let free = self.freed(&rows, model, decided, (swinging, hopeless))?;
+        let is_settled = free.error - 1.0 < LEFT_OF_SWINGS * (decided.error - 1.0);
+        if !is_settled || free.error >= A_LITTLE_BETTER * decided.error {
+            return Ok(false);
+        }
+        if is_open {
+            *decided = free;
+        }
+        decided.tests.retain(|(one, _)| *one != swinging);
+        decided.tests.push((swinging, test));
+        Ok(is_open)
+    }
+
+    /// What a record is with one of its constants set free, or roughly where it is hopeless; the error is infinite where that is not determined.
+    fn freed(
+        &mut self,
+        rows: &Rows,
+        model: &Model,
+        decided: &Decided,
+        (constant, hopeless): (usize, f64),
+    ) -> Result<Decided, Error> {
+        let mut free = decided.clone();
+        free.slow.push(constant);
+        self.set_free(rows, model, &mut free, hopeless)?;
+        if free.fit.is_none() {
+            free.error = f64::INFINITY;
+        }
+        Ok(free)
+    }
+
+    /// The undecided constant that seems to grow most along the record.
+    fn growing(&mut self, rows: &Rows, decided: &Decided, fit: &Fit) -> Result<Option<usize>, Error> {
+        let trends = self.trends(rows, decided, fit)?;
+        let undecided = self.undecided();
+        let growing = decided.model.constant.iter().zip(&trends).filter_map(|(&one, trend)| Some((one, (*trend)?)));
+        let growing = growing.filter(|(one, trend)| undecided.contains(one) && trend.is_conspicuous());
+        let most = growing.max_by(|a, b| a.1.excess().total_cmp(&b.1.excess()));
+        Ok(most.map(|(most, _)| most))
+    }
+
+    /// The constant of the motion that differs most between short parts of the record, if one does.
+    pub(crate) fn swinging(&mut self, rows: &Rows, decided: &Decided) -> Result<Option<Swinging>, Error> {
+        let Some(fit) = decided.fit.as_ref().filter(|fit| fit.scale.is_some()) else { return Ok(None) };
+        let problem = decided.problem(decided.rows(rows), self.noise[0]);
+        let coefficients = self.record.coefficients.len();
+        let may: Vec<bool> = decided.model.constant.iter().map(|&one| one < coefficients).collect();
+        let (noise, instructions) = (self.test_noise(decided), self.options.instructions);
+        swinging(&problem, (fit, &may), noise, instructions, &mut self.stages)
+    }
+
+    /// Sets all that was tested free where one of them changes, if rows are predicted better then: a parameter that varies beside one that is held
+    /// constant needs windows so short that a test sees little, if anything.
+    pub(crate) fn set_others_free(&mut self, rows: &Rows, model: &Model, decided: &mut Decided) -> Result<(), Error> {
+        let others: Vec<usize> = self.undecided().into_iter().filter(|one| !decided.slow.contains(one)).collect();
+        if decided.slow.is_empty() || others.is_empty() {
+            return Ok(());
+        }
+        let mut free = decided.clone();
+        free.slow.extend(others);
+        self.set_free(rows, model, &mut free, f64::INFINITY)?;
+        let least = if decided.error < BADLY { A_LITTLE_BETTER } else { BETTER };
+        if free.fit.is_some() && free.error < least * decided.error {
+            *decided = free;
+        }
+        Ok(())
+    }
+
+    /// The search for what varies slowly along all of the record, without an end before the last round.
+    pub(crate) fn slow_search<'a>(
+        &self,
+        rows: &'a Rows,
+        ordered: &'a Model,
+        decided: &'a Decided,
+    ) -> slowly_varying::SlowSearch<'a> {
+        slowly_varying::SlowSearch {
+            rows,
+            model: ordered,
+            coefficients: decided.slow.len(),
+            noise: self.noise[0],
+            expected: decided.expected,
+            scales: &decided.scales,
+            longest: decided.longest,
+            hopeless: f64::INFINITY,
+            breaks: &[],
+            simpler: 1.0,
+            instructions: self.options.instructions,
+        }
+    }
+
+    /// Estimates what varies slowly, and the other constants beside it; with an error that is hopeless, roughly.
+    pub(crate) fn set_free(
+        &mut self,
+        rows: &Rows,
+        model: &Model,
+        decided: &mut Decided,
+        hopeless: f64,
+    ) -> Result<(), Error> {
+        let instructions = self.options.instructions;
+        let Some(first) = decided.first else { return Ok(()) };
+        let rest = model.constant.iter().copied().filter(|one| !decided.slow.contains(one)).collect();
+        decided.model = Model { constant: rest, ..model.clone() };
+        let ordered = decided.ordered();
+        let search = slowly_varying::SlowSearch { hopeless, ..self.slow_search(rows, &ordered, decided) };
+        let mut found = slowly_varying::find(&search, first, &mut self.stages)?;
+        if !rows.jumps.is_empty() {
+            // What jumps may be the inertia as well as the stiffness.
+            let simpler = if decided.constants_jump { SIMPLER } else { 1.0 };
+            let jumping = slowly_varying::SlowSearch { breaks: &rows.jumps, simpler, ..search };
+            let jumping = slowly_varying::find(&jumping, first, &mut self.stages)?;
+            // A curve that bends quickly comes near the rows that it was taken from, a jump or not: it is judged by others.
+            let predicted = |one: &Option<slowly_varying::SlowCoefficients>| {
+                one.as_ref().map_or(f64::INFINITY, |one| one.predicted)
+            };
+            found = if simpler * predicted(&jumping) < predicted(&found) { jumping } else { found };
+        }
+        decided.found = found;
+        decided.fit = None;
+        if let Some(found) = &decided.found {
+            decided.model.taken.clone_from(&found.taken);
+            let problem = decided.problem(rows, self.noise[0]);
+            let (scale, expected) = (Some(found.scale), decided.expected);
+            let fit = Fit::new(&problem, scale, expected, instructions, &mut self.stages)?;
+            (decided.error, decided.fit) = (found.error, fit);
+        }
+        Ok(())
+    }
+}
+
+/// Rows in which the rate of a coefficient that was given as constant, for which they have no column, makes nothing: good enough to tell whether it
+/// changes.
+fn without_rate(rows: &Rows, coefficient: usize) -> Rows {
+    let mut rows = rows.clone();
+    rows.regressors[coefficient].companion = vec![0.0; rows.len()];
+    rows
+}
