@@ -41,17 +41,18 @@ pub(crate) struct Swinging {
     pub(crate) longest: Option<usize>,
 }
 
-/// The constant of a fit, of those that `may` swing, that differs most between parts of some length, if one does.
+/// The constants of a fit, of those that `may` swing, that differ between parts of some length, those first that differ most.
 pub(crate) fn swinging(
     problem: &Problem<'_>,
     (fit, may): (&Fit, &[bool]),
     noise: TestNoise<'_>,
     instructions: Instructions,
     stages: &mut Stages<'_, '_>,
-) -> Result<Option<Swinging>, Error> {
+) -> Result<Vec<Swinging>, Error> {
     if !may.contains(&true) {
-        return Ok(None);
+        return Ok(Vec::new());
     }
+    let constants: Vec<usize> = (0..problem.layout.constant).filter(|&constant| may[constant]).collect();
     let mut differing: Vec<Swinging> = Vec::new();
     for (place, (length, count)) in lengths(problem.rows(), WINDOWS * fit.span).into_iter().enumerate() {
         let driven = |rows: &Range<usize>| drive(problem, (rows, noise.equations), noise.expected, noise.inflation);
@@ -59,7 +60,7 @@ pub(crate) fn swinging(
         let pieces = driven.map(|rows| Piece { size: rows.len(), content: rows }).collect();
         let estimate = |part: Range<usize>, (): &mut ()| estimate(problem, fit, noise, part, instructions);
         let estimates: Vec<Estimate> = stages.map(pieces, || (), estimate)?;
-        for constant in (0..problem.layout.constant).filter(|&constant| may[constant]) {
+        for &constant in &constants {
             let each = estimates.iter().flatten();
             let each: Vec<_> = each.map(|(values, variances)| (values[constant], variances[constant])).collect();
             if let Some(test) = compare(&each).filter(|_| most_differ(&each)) {
@@ -67,10 +68,16 @@ pub(crate) fn swinging(
             }
         }
     }
-    let most = differing.iter().max_by(|a, b| a.test.excess().total_cmp(&b.test.excess())).map(|most| most.constant);
-    differing.retain(|one| Some(one.constant) == most);
-    let all = differing.iter().map(|one| one.test.deviation).fold(0.0, f64::max);
-    Ok(differing.into_iter().find(|one| one.test.deviation >= NEARLY_ALL * all))
+    let of_constant = |constant: usize| {
+        let of = || differing.iter().filter(move |one| one.constant == constant);
+        let most = of().map(|one| one.test.excess()).fold(0.0, f64::max);
+        let deviation = of().map(|one| one.test.deviation).fold(0.0, f64::max);
+        let longest = of().find(|one| one.test.deviation >= NEARLY_ALL * deviation)?;
+        Some((most, longest.clone()))
+    };
+    let mut found: Vec<(f64, Swinging)> = constants.into_iter().filter_map(of_constant).collect();
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    Ok(found.into_iter().map(|(_, one)| one).collect())
 }
 
 /// Lengths of parts of so many rows, the longest first, and how many of each are compared.
@@ -125,7 +132,7 @@ mod tests {
     }
 
     /// What short parts and the eight blocks of these rows say, in windows of so many rows, where rows are predicted as badly as what swings makes them.
-    fn said((rows, depth): (&Rows, f64), window: usize, may: [bool; 2]) -> (Option<Swinging>, bool) {
+    fn said((rows, depth): (&Rows, f64), window: usize, may: [bool; 2]) -> (Vec<Swinging>, bool) {
         let problem = model().problem(rows, &rows.rhs, 0.0, None);
         let variance = DEVIATION * DEVIATION;
         let fit = Fit::in_rows(&problem, window, white(variance), Instructions::Scalar).expect("constants");
@@ -149,7 +156,7 @@ mod tests {
         // A block of 400 rows holds two cycles, or four; windows are shorter than a cycle, or longer by far.
         for (period, window) in [(200.0, 24), (200.0, 64), (200.0, 800), (100.0, 24)] {
             let (found, differs) = said((&swung(0.3, period, line), 0.3), window, [true; 2]);
-            let found = found.expect("it swings");
+            let [found] = &found[..] else { panic!("one swings: {found:?}") };
             assert_eq!(found.constant, 0);
             assert!(
                 found.longest.is_some_and(|rows| (rows as f64) < period) && found.test.probability < NO_CHANCE,
@@ -165,20 +172,32 @@ mod tests {
     #[test]
     fn no_length_is_told_where_long_parts_hide_nothing() {
         let (found, _) = said((&swung(0.3, 1600.0, line), 0.3), 24, [true; 2]);
-        assert_eq!(found.expect("it swings").longest, None);
+        assert_eq!(found.first().expect("it swings").longest, None);
+    }
+
+    #[test]
+    fn of_two_that_swing_the_one_comes_first_that_differs_most() {
+        let mut rows = swung(0.1, 200.0, line);
+        for row in 0..ROWS {
+            let more = 0.6 * CONSTANTS[1] * (2.0 * std::f64::consts::PI * row as f64 / 150.0).sin();
+            rows.rhs[row] += more * rows.regressors[2].value[row];
+        }
+        let both = |may| said((&rows, 0.1), 24, may).0.iter().map(|one| one.constant).collect::<Vec<_>>();
+        assert_eq!(both([true; 2]), [1, 0]);
+        assert_eq!(both([true, false]), [0]);
     }
 
     #[test]
     fn nothing_swings_where_nothing_does_nor_what_may_not() {
-        assert!(said((&swung(0.0, 200.0, line), 0.0), 64, [true; 2]).0.is_none());
-        assert!(said((&swung(0.3, 200.0, line), 0.3), 64, [false; 2]).0.is_none());
+        assert!(said((&swung(0.0, 200.0, line), 0.0), 64, [true; 2]).0.is_empty());
+        assert!(said((&swung(0.3, 200.0, line), 0.3), 64, [false; 2]).0.is_empty());
     }
 
     #[test]
     fn a_few_parts_over_jumps_are_no_swing() {
         // The windowed unknown jumps in five of 64 parts, and its windows are no shorter than they.
         let jumping = |time: f64| [if (time / 270.0).floor() % 2.0 < 1.0 { 1.0 } else { 3.0 }, 0.0];
-        assert!(said((&swung(0.0, 200.0, jumping), 0.0), 24, [true; 2]).0.is_none());
+        assert!(said((&swung(0.0, 200.0, jumping), 0.0), 24, [true; 2]).0.is_empty());
     }
 
     #[test]

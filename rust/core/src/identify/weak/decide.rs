@@ -166,6 +166,10 @@ impl Session<'_, '_, '_> {
                     // Nothing more may vary that would predict well.
                     break;
                 }
+                if let Some(free) = self.swinging_beside_constants(chosen, &model, &mut decided)? {
+                    (model, decided) = (Cow::Owned(free.model.clone()), free);
+                    continue;
+                }
                 is_free = self.set_unsteady_free(rows, &model, &mut decided)?;
                 if is_free {
                     continue;
@@ -173,18 +177,10 @@ impl Session<'_, '_, '_> {
                 break;
             };
             if model.windowed.is_empty() {
-                // Beside constants it is followed in windows, as a stiffness is.
-                let constant = model.constant.iter().copied().filter(|&one| one != worst).collect();
-                let linear = self.options.linear;
-                model = Cow::Owned(Model { windowed: vec![worst], constant, linear, ..Model::default() });
-                let before = decided.clone();
-                (decided.model, decided.white, decided.correlated) = (model.clone().into_owned(), None, None);
-                (decided.covariance, decided.expected) = self.covariance(&chosen.weak, chosen.parameters);
-                self.fit_constants(&chosen.weak, &mut decided)?;
-                if decided.fit.is_none() {
-                    decided = before;
+                let Some(free) = self.in_windows((&chosen.weak, chosen.parameters), &model, &decided, worst)? else {
                     break;
-                }
+                };
+                (model, decided) = (Cow::Owned(free.model.clone()), free);
             } else {
                 decided.slow.push(worst);
                 if self.varies_too_much(&decided) {

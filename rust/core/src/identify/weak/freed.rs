@@ -4,13 +4,19 @@ use std::borrow::Cow;
 
 use crate::equation::rows::Rows;
 use crate::error::Error;
+use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decide::{BADLY, BETTER};
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
+use crate::inference::constancy::Test;
+use crate::inference::part_constants::TestNoise;
 use crate::inference::short_parts::{Swinging, swinging};
 use crate::inference::slowly_varying;
 use crate::regression::fit::Fit;
+use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
+use crate::regression::residuals::residuals;
+use crate::weak_form::weak_rows::WeakRows;
 
 /// The part of the mean squared error of predicting rows that must be left where no test of parts says that anything changes.
 const FAR_BETTER: f64 = 0.5;
@@ -21,8 +27,14 @@ const A_LITTLE_BETTER: f64 = 0.9;
 /// .35 where a friction or a drag is missing.
 const LEFT_OF_SWINGS: f64 = 0.2;
 
+/// The same where it is followed in windows beside constants alone: what makes a stiffness or a damping of a spring that hardens or a drag leaves .21 and more.
+const LEFT_IN_WINDOWS: f64 = 0.15;
+
 /// The same after the first round of a search, from which on it is not worth another.
 const HOPELESS: f64 = 0.5;
+
+/// The mean square that constants alone leave, over the noise's variance, from which on short parts are compared.
+const MORE_THAN_NOISE: f64 = 1.2;
 
 /// Where constants jump, those that do not change in between stand unless others predict so much better.
 const SIMPLER: f64 = 0.98;
@@ -69,6 +81,84 @@ impl Session<'_, '_, '_> {
         Ok(is_open)
     }
 
+    /// What a record is where one of its constants is followed in windows, as a stiffness is, beside the others alone; `None` where that is not determined.
+    pub(crate) fn in_windows(
+        &mut self,
+        (weak, parameters): (&WeakRows, [f64; 3]),
+        model: &Model,
+        decided: &Decided,
+        one: usize,
+    ) -> Result<Option<Decided>, Error> {
+        let constant = model.constant.iter().copied().filter(|&other| other != one).collect();
+        let model = Model { windowed: vec![one], constant, linear: self.options.linear, ..Model::default() };
+        let mut free = Decided { model, white: None, correlated: None, ..decided.clone() };
+        (free.covariance, free.expected) = self.covariance(weak, parameters);
+        self.fit_constants(weak, &mut free)?;
+        Ok(Some(free).filter(|free| free.fit.is_some()))
+    }
+
+    /// Follows the constant in windows that swings where there are constants alone, the one of several that leaves least so, if that is hardly more than
+    /// noise. One that was given as constant is contradicted.
+    pub(crate) fn swinging_beside_constants(
+        &mut self,
+        chosen: &Chosen,
+        model: &Model,
+        decided: &mut Decided,
+    ) -> Result<Option<Decided>, Error> {
+        let (weak, undecided) = (&chosen.weak, self.undecided());
+        let (left, found) = self.swinging_alone(weak, decided)?;
+        let mut best: Option<(Decided, usize, Test)> = None;
+        for Swinging { constant, test, .. } in found {
+            let swinging = decided.model.constant[constant];
+            let weak = if undecided.contains(&swinging) {
+                Cow::Borrowed(weak)
+            } else {
+                Cow::Owned(weak.with(without_rate(&weak.rows, swinging)))
+            };
+            let free = self.in_windows((&weak, chosen.parameters), model, decided, swinging)?;
+            let is_better = |free: &Decided| best.as_ref().is_none_or(|(best, ..)| free.error < best.error);
+            best = free.filter(is_better).map(|free| (free, swinging, test)).or(best);
+        }
+        let Some((free, swinging, mut test)) = best else { return Ok(None) };
+        let [before, after] = [(left, &*decided), (free.error, &free)].map(|(left, one)| left * self.raised(weak, one));
+        if free.error >= NOISE_MODEL_FAILS || after - 1.0 >= LEFT_IN_WINDOWS * (before - 1.0) {
+            return Ok(None);
+        }
+        if undecided.contains(&swinging) {
+            return Ok(Some(free));
+        }
+        let usable = weak.rows.usable.iter().filter(|usable| **usable).count() as f64;
+        let values = free.fit.as_ref().map_or_else(Vec::new, |fit| fit.values(0));
+        let predicted = Test::of_prediction(before / after, usable / free.expected.variance_inflation, &values);
+        test.probability = test.probability.min(predicted.probability);
+        decided.tests.retain(|(one, _)| *one != swinging);
+        decided.tests.push((swinging, test));
+        Ok(None)
+    }
+
+    /// What constants alone leave of rows, over the noise's variance, and those of the motion that differ between short parts of the record by more than
+    /// that, where it is more than noise.
+    fn swinging_alone(&mut self, weak: &WeakRows, decided: &Decided) -> Result<(f64, Vec<Swinging>), Error> {
+        let alone = |_: &&Fit| decided.model.windowed.is_empty() && self.options.averaging;
+        let Some(fit) = decided.fit.as_ref().filter(alone) else { return Ok((1.0, Vec::new())) };
+        let problem = decided.problem(decided.rows(&weak.rows), self.noise[0]);
+        let (left, usable) = residuals(&problem, fit, &mut self.stages)?;
+        let count = usable.iter().filter(|usable| **usable).count().max(1) as f64;
+        let left = left.iter().map(|left| left * left).sum::<f64>() / count / decided.expected.variance;
+        if left * self.raised(weak, decided) < MORE_THAN_NOISE {
+            return Ok((left, Vec::new()));
+        }
+        let may = self.of_motion(decided);
+        let noise = TestNoise { inflation: left.max(1.0), ..self.test_noise(decided) };
+        Ok((left, swinging(&problem, (fit, &may), noise, self.options.instructions, &mut self.stages)?))
+    }
+
+    /// Which of the constants are of the motion.
+    fn of_motion(&self, decided: &Decided) -> Vec<bool> {
+        let coefficients = self.record.coefficients.len();
+        decided.model.constant.iter().map(|&one| one < coefficients).collect()
+    }
+
     /// What a record is with one of its constants set free, or roughly where it is hopeless; the error is infinite where that is not determined.
     fn freed(
         &mut self,
@@ -100,10 +190,9 @@ impl Session<'_, '_, '_> {
     pub(crate) fn swinging(&mut self, rows: &Rows, decided: &Decided) -> Result<Option<Swinging>, Error> {
         let Some(fit) = decided.fit.as_ref().filter(|fit| fit.scale.is_some()) else { return Ok(None) };
         let problem = decided.problem(decided.rows(rows), self.noise[0]);
-        let coefficients = self.record.coefficients.len();
-        let may: Vec<bool> = decided.model.constant.iter().map(|&one| one < coefficients).collect();
+        let may = self.of_motion(decided);
         let (noise, instructions) = (self.test_noise(decided), self.options.instructions);
-        swinging(&problem, (fit, &may), noise, instructions, &mut self.stages)
+        Ok(swinging(&problem, (fit, &may), noise, instructions, &mut self.stages)?.into_iter().next())
     }
 
     /// Sets all that was tested free where one of them changes, if rows are predicted better then: a parameter that varies beside one that is held
