@@ -11,6 +11,7 @@ use crate::inference::constancy::{self, Test};
 use crate::inference::cross_validation::{Validated, best, validate};
 use crate::inference::jumps::jump::Jump;
 use crate::inference::part_constants::{NoiseFrom, TestNoise};
+use crate::inference::short_parts::swinging;
 use crate::regression::fit::Fit;
 use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
@@ -36,6 +37,22 @@ const TRIED: usize = 3;
 
 /// Mean squared error of predicting a row, over the noise's, up to which nothing else changes.
 const WELL: f64 = 1.3;
+
+/// What is left, over the noise's variance, from which on short parts are compared, and the part of what noise does not explain that windows may leave of
+/// it which follow what swings.
+const MORE_THAN_NOISE: f64 = 1.2;
+const LEFT_OF_SWINGS: f64 = 0.2;
+
+/// Why a constant is tried in windows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sought {
+    /// It differs between parts of the record.
+    Differing,
+    /// It differs between short parts all over it alone.
+    Swinging,
+    /// Constants leave so much that no part can differ by more.
+    Hidden,
+}
 
 /// The elements' values and the equations' misfits that weights are made of.
 type Guess = (Vec<f64>, Vec<f64>);
@@ -168,12 +185,16 @@ impl MergedSession<'_, '_, '_> {
         let Some(mut fitted) = self.fitted(model)? else { return Ok(None) };
         loop {
             let found = self.tests(&fitted, NoiseFrom::Channels)?;
-            let tried = different(&found);
+            let mut tried = different(&found);
             fitted.take_tests(found);
             // What constants leave may be so much that no part of the record differs by more, though one of them changes.
-            let hidden = tried.is_empty() && fitted.error > MORE;
+            let mut sought = if tried.is_empty() && fitted.error > MORE { Sought::Hidden } else { Sought::Differing };
+            if tried.is_empty() && (MORE_THAN_NOISE..=MORE).contains(&fitted.error) {
+                (sought, tried) = (Sought::Swinging, self.swinging(&fitted)?);
+            }
+            let hidden = sought == Sought::Hidden;
             let before = (self.parameters.clone(), self.misfits.clone());
-            let Some(Freed { one, found, guess }) = self.freed(&fitted, tried, hidden)? else {
+            let Some(Freed { one, found, guess }) = self.freed(&fitted, tried, sought)? else {
                 (self.parameters, self.misfits) = before;
                 self.fill();
                 let told = self.told_by_what_is_left(fitted)?;
@@ -213,20 +234,22 @@ impl MergedSession<'_, '_, '_> {
 
     /// The constant that explains most where windows follow it, if that is worth it: of those that differ between parts of the record, or of all
     /// where no part can.
-    fn freed(&mut self, fitted: &MergedFit, mut tried: Vec<usize>, hidden: bool) -> Result<Option<Freed>, Error> {
+    fn freed(&mut self, fitted: &MergedFit, mut tried: Vec<usize>, sought: Sought) -> Result<Option<Freed>, Error> {
         let before = (self.parameters.clone(), self.misfits.clone());
+        let hidden = sought == Sought::Hidden;
         if hidden {
             tried = self.suspects(&fitted.model)?;
         }
         tried.truncate(TRIED);
         let may_be_noise = (MORE..NO_NOISE).contains(&fitted.error);
-        let most = match (hidden, may_be_noise) {
-            (true, _) if fitted.error > NOISE_MODEL_FAILS => LACKING,
-            (true, _) | (false, true) => SHOWN,
-            (false, false) => BETTER,
+        let most = match (sought, may_be_noise) {
+            (Sought::Swinging, _) => (1.0 + LEFT_OF_SWINGS * (fitted.error - 1.0)) / fitted.error,
+            (Sought::Hidden, _) if fitted.error > NOISE_MODEL_FAILS => LACKING,
+            (Sought::Hidden, _) | (Sought::Differing, true) => SHOWN,
+            (Sought::Differing, false) => BETTER,
         };
         // Where nothing but the noise of the channels is left, or what no noise is, what a test says is enough.
-        let enough = fitted.model.windowed.is_empty() && !hidden && !may_be_noise;
+        let enough = fitted.model.windowed.is_empty() && sought == Sought::Differing && !may_be_noise;
         let mut best: Option<Freed> = None;
         for one in tried {
             (self.parameters, self.misfits) = before.clone();
@@ -358,6 +381,20 @@ impl MergedSession<'_, '_, '_> {
         let tests = constancy::test(&problem, &fitted.fit, noise, self.options.instructions, &mut self.stages)?;
         let of_constants = fitted.model.constant.iter().copied().zip(tests);
         Ok(of_constants.filter(|(one, _)| self.is_tried(*one)).filter_map(|(one, test)| Some((one, test?))).collect())
+    }
+
+    /// Constants of the motion that differ between short parts of the records, those first that differ most.
+    fn swinging(&mut self, fitted: &MergedFit) -> Result<Vec<usize>, Error> {
+        let NoiseOfRows { covariance, expected, inflation, from } = NoiseOfRows::of_channels(fitted);
+        let rows = &self.all.rows;
+        let problem = fitted.model.problem(rows, &rows.rhs, 1.0, Some(&fitted.correlated));
+        let noise =
+            TestNoise { expected, covariance: &covariance, inflation, from, equations: self.merged.equations() };
+        let constants = &fitted.model.constant;
+        let may = |one: &usize| self.merged.elements[*one].is_of_motion() && self.is_tried(*one);
+        let may: Vec<bool> = constants.iter().map(may).collect();
+        let found = swinging(&problem, (&fitted.fit, &may), noise, self.options.instructions, &mut self.stages)?;
+        Ok(found.into_iter().map(|one| constants[one.constant]).collect())
     }
 }
 
