@@ -136,7 +136,7 @@ def found_expansion(
         is_of_time=expansion.is_of_time,
         chosen=None in expansion.given_sizes,
         against_windows=(float("nan"), 0) if windows is None else windows.differ(*found),
-        missed_jumps=() if windows is None else [float(time[at]) for at in windows.missed_jumps(found[0])],
+        missed_jumps=() if windows is None else [float(time[at]) for at in windows.missed_jumps(*found)],
     )
 
 

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._expansion.rows import Curves, ExpandedRecord, ExpandedUnknown
-from tvident._expansion.whitened_rows import Noise, WhitenedRows
+from tvident._expansion.whitened_rows import KEPT, Noise, WhitenedRows
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -119,7 +119,8 @@ class Linearised:
     """
 
     def __init__(self, records: Sequence[ExpandedRecord], curves: Curves, noise: Noise, known: Curves) -> None:
-        self._each = [WhitenedRows(record, curves, noise, known) for record in records]
+        most_kept = KEPT // max(1, len(records))
+        self._each = [WhitenedRows(record, curves, noise, known, most_kept) for record in records]
         self.residuals = np.concatenate([one.residuals for one in self._each])
         self.observations = sum(one.observations for one in self._each)
 

@@ -18,8 +18,8 @@ Noise: TypeAlias = tuple[Sequence[float], Sequence[float]]
 """Variances of the noise of every angle and of every torque."""
 
 
-_AT_ONCE, _KEPT = 1 << 22, 1 << 24
-"""Numbers of the whitened columns that are in memory at once, and of those that are kept: 32 and 128 MiB."""
+_AT_ONCE, KEPT = 1 << 21, 1 << 22
+"""Numbers of the whitened columns that are in memory at once, and of those that all records keep: 16 and 32 MiB."""
 
 
 class WhitenedRows:
@@ -33,15 +33,21 @@ class WhitenedRows:
     noise : Noise
     known : Curves
         Those of the curves that are known beforehand.
+    most_kept : int
+        Numbers of whitened columns that are kept.
     """
 
-    def __init__(self, record: ExpandedRecord, curves: Curves, noise: Noise, known: Curves) -> None:
+    def __init__(
+        self, record: ExpandedRecord, curves: Curves, noise: Noise, known: Curves, most_kept: int = KEPT
+    ) -> None:
         self.record = record
+        self._most_kept = most_kept
         curves, known = (_own(record, one) for one in (curves, known))
         self._curves, self._noise = curves, noise
         self._kept: dict[tuple[str, tuple[int, ...] | None], Array] = {}
         usable = record.usable_rows()
         self._torques, self._late = record.late()
+        self._late_spread = record.late_spread()
         band, left, rhs = self._band_and_residuals()
         left[~usable] = 0.0
         self._usable = usable
@@ -66,12 +72,15 @@ class WhitenedRows:
     def _kept_columns(self, one: ExpandedUnknown) -> Array:
         """Return the whitened columns of one unknown, which are kept: searches for a size ask for those of all others again and again."""
         key = one.name, None if one.basis is None else tuple(one.basis.sizes)
-        if key not in self._kept:
-            found = list(self._pieces(lambda samples: self._columns([one], samples), None))
-            if sum(kept.size for kept in self._kept.values()) > _KEPT:
-                self._kept.clear()
-            self._kept[key] = np.concatenate(found)
-        return self._kept[key]
+        found = self._kept.pop(key, None)
+        if found is None:
+            found = np.concatenate(list(self._pieces(lambda samples: self._columns([one], samples), None)))
+        # Those that were asked for longest ago are forgotten first.
+        kept = found.size + sum(other.size for other in self._kept.values())
+        while self._kept and kept > self._most_kept:
+            kept -= self._kept.pop(next(iter(self._kept))).size
+        self._kept[key] = found
+        return found
 
     @cached_property
     def _white_rhs(self) -> Array:
@@ -128,7 +137,7 @@ class WhitenedRows:
     def _white(self, samples: slice, rows: int, apart: int) -> Array:
         """Return the covariance that noise of the torque of variance one gives rows from a sample on with rows some samples before."""
         later, earlier = self._late[: self.record.length - apart], self._late[apart:]
-        spread = self.record.late_spread()
+        spread = self._late_spread
         if spread is None:
             return np.full(rows, later @ earlier)
         products = later * earlier

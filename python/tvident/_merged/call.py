@@ -90,8 +90,11 @@ class AskedTogether:
         core reads that with the variance alone.
         """
         if equations.expansions:
-            windows = replace(self, step=1).part(equations.in_windows, samples, noise, place, is_white=is_white)
-            return self._expanded(windows, equations)
+
+            def windows(asked: AskedTogether, some: Equations) -> Part:
+                return asked.part(some, samples, noise, place, is_white=is_white)
+
+            return self._expanded(equations, partial(windows, replace(self, step=1)), partial(windows, self))
         asked = self.forms[min(place, len(self.forms) - 1)]
         identified = partial(
             _core.identify_merged,
@@ -121,8 +124,21 @@ class AskedTogether:
         same = noise or (None if max(found.colours, default=1.0) > 1 else found.noise)
         return Part(found, equations, lambda others: again.part(others, samples, same), chosen)
 
-    def _expanded(self, windows: Part, equations: Equations) -> Part:
-        """Return what takes the place of windows where elements are sums of functions; windows themselves where they determine nothing."""
+    def _expanded(
+        self,
+        equations: Equations,
+        every_sample: Callable[[Equations], Part],
+        wanted: Callable[[Equations], Part],
+    ) -> Part:
+        """Return what takes the place of windows where elements are sums of functions; windows themselves where they determine nothing.
+
+        Parameters
+        ----------
+        equations : Equations
+        every_sample, wanted : callable
+            Give windows of equations at every sample, and at the samples that are wanted.
+        """
+        windows = every_sample(equations.in_windows)
         assert isinstance(windows.found, _core.MergedIdentification)  # noqa: S101 - for mypy
         time = self.sampling.times(windows.found.status.size)
         units = self.units_of(equations.elements)
@@ -131,10 +147,10 @@ class AskedTogether:
         each = ExpandedEquations(equations, windows.found, self.sampling.period, time, self.step, units, phase)
         found = each.found()
         if found is None:
-            return windows
+            return windows if self.step == 1 else wanted(equations.in_windows)
         chosen = [one for one in windows.chosen if one != "regression_window"]
         fixed = equations.of_sizes({name: curve.size for name, curve in found.curves.items()})
-        return Part(found, fixed, lambda others: self._expanded(windows.again(others.in_windows), others), chosen)
+        return Part(found, fixed, lambda others: self._expanded(others, windows.again, wanted), chosen)
 
     @staticmethod
     def _check_window(wanted: int | None, nearest: int) -> None:

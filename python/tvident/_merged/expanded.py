@@ -319,7 +319,9 @@ class FoundExpanded:
             return None
         samples, length = self._time.size, self.windows.window_length
         values, errors = (np.broadcast_to(one, samples) for one in (found.values, found.stderr))
-        trusted = (self.windows.status & DOUBTFUL == 0) & np.isfinite(values)
+        # In gaps and at the ends windows are carried on.
+        doubts = DOUBTFUL | int(Status.GAP | Status.EDGE)
+        trusted = (self.windows.status & doubts == 0) & np.isfinite(values)
         rows = self.windows.regression_window + length
         return WindowsBeside(values, errors, trusted, rows, length // 2, list(self.windows.jumps))
 

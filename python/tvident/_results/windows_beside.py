@@ -17,6 +17,9 @@ _JUMPS = 2.0
 _FOLLOWED = 0.5
 """Of a jump, by which an expansion must change within the test function to follow it."""
 
+_OFF = 5.0
+"""Standard errors of the difference from windows that an expansion may be off just before and just after a jump."""
+
 
 @dataclass(frozen=True)
 class WindowsBeside:
@@ -57,8 +60,14 @@ class WindowsBeside:
         squares = ((self.values[apart] - values[apart]) ** 2 / variance)[there]
         return float(np.mean(squares)), int(there.sum())
 
-    def missed_jumps(self, values: Array) -> list[int]:
-        """Return the jumps that the expansion does not follow within the test function that sees both sides."""
+    def missed_jumps(self, values: Array, errors: Array) -> list[int]:
+        """Return the jumps that the expansion does not follow within the test function that sees both sides.
+
+        Parameters
+        ----------
+        values, errors : ndarray, shape (n,)
+            Of the expansion.
+        """
         missed = []
         for at in self.jumps:
             before, after = max(at - self.half, 0), min(at + self.half, self.values.size - 1)
@@ -67,6 +76,10 @@ class WindowsBeside:
             # Beside it few equations are left, since no test function may reach over it.
             size = self.values[after] - self.values[before]
             known = abs(size) > _JUMPS * np.hypot(self.errors[after], self.errors[before])
-            if known and not (values[after] - values[before]) / size > _FOLLOWED:
+            beside = [before, after]
+            differs = np.abs(values[beside] - self.values[beside]) > _OFF * np.hypot(
+                errors[beside], self.errors[beside]
+            )
+            if known and (differs.any() or not (values[after] - values[before]) / size > _FOLLOWED):
                 missed.append(at)
         return missed

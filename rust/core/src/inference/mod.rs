@@ -1,6 +1,7 @@
 //! Statistical inference: cross-validation, tests of constancy, jumps, identifiability, missing terms and whether anything is explained.
 
 pub(crate) mod bandwidths;
+pub(crate) mod carried_on;
 pub(crate) mod constancy;
 pub(crate) mod cross_validation;
 pub(crate) mod drive;

@@ -12,6 +12,7 @@ use crate::identify::merged::session::MergedSession;
 use crate::identify::merged::suspected_terms::SuspectedTerms;
 use crate::identify::results::{RowResults, SampleResults};
 use crate::identify::scanned::Scan;
+use crate::inference::carried_on::far_from_equations;
 use crate::inference::constancy::{self, Test};
 use crate::inference::identifiability::is_mostly_noise;
 use crate::inference::missing_terms::Missing;
@@ -195,6 +196,7 @@ impl MergedSession<'_, '_, '_> {
         let condition = fit.full.field(fit.full.fields.condition());
         let mut status = vec![0; rows.len()];
         let usable = &self.whole.as_ref().unwrap_or(rows).usable;
+        let far = if windowed.is_empty() { Vec::new() } else { far_from_equations(usable, fit.span / 4) };
         for (time, usable) in usable.chunks(group).enumerate() {
             // What one trial misses others have; an element that is in none of the others' equations has no number.
             let lacks = || averages.values.iter().any(|column| column[time * group].is_nan());
@@ -206,7 +208,7 @@ impl MergedSession<'_, '_, '_> {
                 if averages.values.iter().any(|column| !column[row].is_finite()) {
                     here |= Status::INVALID;
                 }
-                if !windowed.is_empty() && condition[fit.nearest(row)] > HARDLY_TOLD_APART {
+                if !windowed.is_empty() && (far[row] || condition[fit.nearest(row)] > HARDLY_TOLD_APART) {
                     here |= Status::ILL_CONDITIONED;
                 }
                 status[row] = here.bits();

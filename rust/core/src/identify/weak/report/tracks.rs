@@ -7,6 +7,7 @@ use crate::exec::stages::Stages;
 use crate::identify::weak::decided::{Decided, rows_of};
 use crate::identify::weak::outside_mask::Outside;
 use crate::identify::weak::session::Session;
+use crate::inference::carried_on::far_from_equations;
 use crate::inference::window_averaging::average;
 use crate::regression::centred_windows::every_window;
 use crate::regression::constants::Expected;
@@ -161,19 +162,6 @@ impl Session<'_, '_, '_> {
     }
 }
 
-/// Rows that are farther than a reach from every row that is an equation: what is windowed is carried on there from beside the gap, and no error knows what
-/// it does meanwhile.
-fn far_from_equations(usable: &[bool], reach: usize) -> Vec<bool> {
-    let mut far = vec![true; usable.len()];
-    let mut near = 0;
-    for row in (0..usable.len()).filter(|&row| usable[row]) {
-        let end = (row + reach + 1).min(usable.len());
-        far[near.max(row.saturating_sub(reach))..end].fill(false);
-        near = end;
-    }
-    far
-}
-
 /// The derivatives of the windowed coefficients with respect to each constant, row by row, from the window nearest to each row.
 fn sensitivities(problem: &Problem<'_>, all: &Fit, stages: &mut Stages<'_, '_>) -> Result<Vec<Vec<f64>>, Error> {
     let layout = problem.layout;
@@ -197,20 +185,4 @@ fn sensitivities(problem: &Problem<'_>, all: &Fit, stages: &mut Stages<'_, '_>) 
         }
     })?;
     Ok(columns)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rows_are_far_from_equations_beyond_the_reach_of_all() {
-        let usable = [false, false, true, true, false, false, false, false, false, true, false];
-        let far = |reach| far_from_equations(&usable, reach).iter().map(|&far| u8::from(far)).collect::<Vec<_>>();
-        assert_eq!(far(0), [1, 1, 0, 0, 1, 1, 1, 1, 1, 0, 1]);
-        assert_eq!(far(1), [1, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0]);
-        assert_eq!(far(2), [0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0]);
-        assert_eq!(far(3), [0; 11]);
-        assert_eq!(far_from_equations(&[false; 3], 5), [true; 3]);
-    }
 }
