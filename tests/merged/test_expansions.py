@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from scipy.signal import lfilter
 
 import tvident
 from merged import gait
@@ -278,6 +279,65 @@ def test_a_mechanism_is_refused() -> None:
     )
     with pytest.raises(ValueError, match="an Expansion of first needs channels as they were recorded; got a Mechanism"):
         identify(recorded.angle, recorded.torque, sample_rate=1000, dof_axis=0, structure=bodies)
+
+
+@pytest.mark.parametrize("step", [1, 5])
+def test_where_windows_determine_nothing_there_is_no_curve(step: int) -> None:
+    recorded, several = masses(), trials()
+    still = identify(
+        np.zeros_like(recorded.angle), recorded.torque, stiffness=Expansion("bspline"), step=step, **OPTIONS
+    )
+    assert set(still.kinds.values()) == {"unknown"}
+    assert still.status.shape == still.time.shape == (SAMPLES // step,)
+    options = {"sample_rate": 1000, "ensemble_axis": 0, "stiffness": Expansion("bspline"), "step": step}
+    assert not identify(np.zeros_like(several.angle), several.torque, **options).trusted.any()
+    lacking = recorded.angle.copy()
+    lacking[1] = np.nan
+    kinds = [Expansion("bspline", of=along(SAMPLES)), "constant"]
+    found = identify(lacking, recorded.torque, stiffness=kinds, step=step, **OPTIONS)
+    assert found.record_status & tvident.Status.RANK_DEFICIENT
+
+
+def test_windows_that_are_carried_on_into_a_mask_contradict_nothing() -> None:
+    several = trials(seed=2704)
+    options = {"sample_rate": 1000, "ensemble_axis": 0, "mask": np.arange(SAMPLES // 2) > 1300}
+    found = identify(several.angle, several.torque, stiffness=Expansion("bspline", of=along(SAMPLES // 2)), **options)
+    assert not found.record_status & tvident.Status.KIND_CONTRADICTED
+    assert found.trusted.all()
+    # Windows themselves are not trusted far from what they were told by, and have no error where they have no value.
+    windowed = identify(several.angle, several.torque, **options)
+    assert windowed.trusted[:1200].mean() < 0.1
+    known = windowed.trusted
+    assert (np.abs(windowed.stiffness - several.stiffness) < 6 * windowed.stderr["stiffness"])[known].all()
+    np.testing.assert_array_equal(np.isnan(windowed.stiffness), np.isnan(windowed.stderr["stiffness"]))
+
+
+def test_a_curve_that_blurs_a_jump_is_contradicted() -> None:
+    jump = chain([lambda t: np.where(t < 3.1, 12.0, 18.0), lambda t: 18 + 0 * t], 6000, seed=2201)
+    found = identify(jump.angle, jump.torque, stiffness=[Expansion("bspline"), "constant"], **OPTIONS)
+    assert found.record_status & tvident.Status.KIND_CONTRADICTED
+    assert any("windows find" in one and "do not follow" in one for one in found.advice)
+
+
+def test_noise_that_is_correlated_asks_for_no_more_functions() -> None:
+    sizes, covered = [], []
+    for seed in range(6):
+        several = simulated(3, 1500, spring, seed=2600 + seed)
+        white = np.random.default_rng(seed).standard_normal(several.torque.shape)
+        coloured = lfilter([1], [1, -0.9], white)
+        kinds = {"stiffness": Expansion("bspline", of=along(1500)), "damping": "constant", "inertia": "constant"}
+        found = identify(
+            several.angle,
+            several.torque + 0.05 * several.torque.std() * coloured,
+            sample_rate=1000,
+            ensemble_axis=0,
+            **kinds,
+        )
+        sizes.append(found.expansions["stiffness"].size)
+        covered.append(np.mean(np.abs(found.stiffness - several.stiffness) < 1.96 * found.stderr["stiffness"]))
+    # As if equations were independent half of them take more than 35, and .65 is covered.
+    assert np.median(sizes) <= 6
+    assert np.mean(covered) > 0.8
 
 
 def test_noise_alone_is_no_curve() -> None:

@@ -5,7 +5,7 @@ from tvident._expansion.basis import Basis, Coordinate
 from tvident._expansion.coordinates import Rates, check_expansion, part_of, refuse
 from tvident._expansion.expansion import Expansion
 from tvident._expansion.families import family_from, plain_family
-from tvident._expansion.fit import Fitted, Linearised
+from tvident._expansion.fit import MORE_THAN_NOISE, Fitted, Linearised, variances_of
 from tvident._expansion.rivals import Rival, Rivals
 from tvident._expansion.rows import (
     Curves,
@@ -35,6 +35,7 @@ from tvident._expansion.whitened_rows import Noise
 
 __all__ = [
     "DERIVATIVES",
+    "MORE_THAN_NOISE",
     "SLACK",
     "AlignedSamples",
     "Basis",
@@ -69,4 +70,5 @@ __all__ = [
     "refuse",
     "spread_of",
     "variance_of_steps",
+    "variances_of",
 ]

@@ -26,6 +26,9 @@ SINGULAR = 1e-12
 """Columns are dependent where the smallest singular value of the scaled factor is this part of the largest."""
 
 
+MORE_THAN_NOISE = 1.3
+"""What is left of the equations, over their noise, from which on it may be correlated in another way."""
+
 _WHOLE = (128, 32)
 """Rows and columns of what BLAS does not divide among threads, which wait for each other by turning: where other programs
 have the processors a factor that takes one thread 1.4 ms took two of them up to 245."""
@@ -45,20 +48,23 @@ class ScoredSize:
         The sum of squares of whitened residuals.
     observations : float
         How many independent equations there were.
+    as_one : float
+        How many of them count as one, since what they leave is correlated.
     """
 
     size: int
     misfit: float
     observations: float
+    as_one: float = 1.0
 
     @property
     def criterion(self) -> float:
         """Akaike's, corrected, with the number of independent equations."""
         k = self.size + 1
-        if self.observations <= k + 1 or not self.misfit > 0:
+        n = self.observations / self.as_one
+        if n <= k + 1 or not self.misfit > 0:
             return float("inf")
-        n = self.observations
-        return float(n * np.log(self.misfit / n) + 2 * k * n / (n - k - 1))
+        return float(n * np.log(self.misfit / self.observations) + 2 * k * n / (n - k - 1))
 
 
 @dataclass(frozen=True)
@@ -160,6 +166,16 @@ class Linearised:
         for one in self._each:
             yield from one.whitened(unknowns)
 
+    def correlation(self, unknowns: Sequence[ExpandedUnknown], fitted: Fitted) -> float:
+        """Return by how much the correlation of what is left makes variances larger than those of as much white noise; at least 1."""
+        free = fitted.observations - fitted.values.size
+        if not free > 0 or not fitted.misfit > MORE_THAN_NOISE * free:
+            return 1.0
+        with np.errstate(all="ignore"):
+            times = variances_of(self.root_of_residuals(unknowns, fitted)) / variances_of(fitted.root)
+        found = float(np.median(times)) * free / fitted.misfit
+        return max(1.0, found) if np.isfinite(found) else 1.0
+
     def root_of_residuals(self, unknowns: Sequence[ExpandedUnknown], fitted: Fitted) -> Array:
         """Return a root of the covariance that follows from whitened residuals and their correlation (Newey and West), not from noise."""
         middle = np.zeros((fitted.values.size, fitted.values.size))
@@ -171,6 +187,11 @@ class Linearised:
             return np.full_like(fitted.root, np.nan)
         squares, axes = np.linalg.eigh(middle)
         return np.asarray(fitted.root @ (axes * np.sqrt(np.maximum(squares, 0.0))))
+
+
+def variances_of(root: Array) -> Array:
+    """Return the variances that belong to a root of a covariance."""
+    return np.asarray((root**2).sum(axis=1))
 
 
 def _scores(rows: WhitenedRows, unknowns: Sequence[ExpandedUnknown], fitted: Fitted) -> Iterator[Array]:

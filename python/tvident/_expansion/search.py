@@ -38,6 +38,9 @@ _NEGLIGIBLE = 1e-3
 _ROUNDS = 2
 """Of choosing sizes and linearising around what was found."""
 
+_ROUNDS_OF_CORRELATED, _CORRELATED = 5, 1.2
+"""The same where what is left is correlated by so much: functions that follow it hide some of it at first."""
+
 _STEPS = 8
 _SETTLED = 1e-7
 """The last steps end once the misfit changes by less than this part of itself."""
@@ -113,6 +116,15 @@ class SizeSearch:
         Variances of every angle and of every torque.
     known : Curves
         Coefficients that are known.
+
+    Attributes
+    ----------
+    tried : dict of tuple of int to Tried
+        By the sizes of all unknowns.
+    rivals : dict of str to Rivals
+        By the name of an expansion.
+    as_one : float
+        How many equations count as one.
     """
 
     records: Sequence[ExpandedRecord]
@@ -121,6 +133,7 @@ class SizeSearch:
     known: Curves
     tried: dict[tuple[int, ...], Tried] = field(default_factory=dict)
     rivals: dict[str, Rivals] = field(default_factory=dict)
+    as_one: float = 1.0
     _scores: dict[tuple[int, ...], tuple[list[ExpandedUnknown], ScoredSize]] = field(default_factory=dict)
     _bends: dict[str, Bend] = field(default_factory=dict)
 
@@ -141,16 +154,17 @@ class SizeSearch:
         around = Linearised(self.records, curves, self.noise, self.known)
         fitted = self._solved(around, sizes)
         before: list[list[int]] = []
-        for _ in range(_ROUNDS):
+        for turn in range(_ROUNDS_OF_CORRELATED):
             self.tried.clear()
             self._scores.clear()
             sizes = self._chosen(around, sizes, free)
             compared, fitted = around, self._solved(around, sizes)
             self._look_at(sizes, fitted)
             around = self._around(sizes, fitted)
-            if not free or sizes == before:
+            if not free or sizes == before or (turn + 1 >= _ROUNDS and self.as_one < _CORRELATED):
                 break
             before = [list(one) for one in sizes]
+            self.as_one = max(self.as_one, compared.correlation(self._unknowns(sizes), fitted))
         self.rivals = self._rivals(compared, sizes)
         for _ in range(_STEPS):
             last, fitted = fitted, self._solved(around, sizes)
@@ -214,12 +228,12 @@ class SizeSearch:
     def _solved(self, around: Linearised, sizes: Sequence[Sequence[int]]) -> Fitted:
         unknowns = self._unknowns(sizes)
         fitted = around.solve(unknowns, self._unseen_of(unknowns))
-        self._keep(sizes, unknowns, fitted.scored)
+        self._keep(sizes, unknowns, replace(fitted.scored, as_one=self.as_one))
         return fitted
 
     def _score(self, around: Linearised, sizes: Sequence[Sequence[int]]) -> ScoredSize:
         unknowns = self._unknowns(sizes)
-        found = around.score(unknowns, self._unseen_of(unknowns))
+        found = replace(around.score(unknowns, self._unseen_of(unknowns)), as_one=self.as_one)
         self._keep(sizes, unknowns, found)
         return found
 

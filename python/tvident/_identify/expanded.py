@@ -82,7 +82,7 @@ class ExpandedTask:
         ]
         words = words_of_expansions(
             told,
-            fit.fitted.observations,
+            fit.independent,
             fit.ratio,
             changing,
             doubted=bool(outcome.doubts_of_windows),

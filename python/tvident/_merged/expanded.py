@@ -336,7 +336,7 @@ class FoundExpanded:
         fitted = self._fit.fitted
         return words_of_expansions(
             self._told,
-            fitted.observations,
+            self._fit.independent,
             self._fit.ratio,
             changing,
             doubted=bool(self._doubts),

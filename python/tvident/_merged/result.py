@@ -264,8 +264,9 @@ class MergedIdentification(Oscillating, Reported):
                 self.tests[name] = one.test.probability
             if one.kind == "constant":
                 self.constants[name] = (float(one.values[0]), float(one.stderr[0] * scatter**0.5))
-            self.elements[name] = np.broadcast_to(one.values, size).copy()
-            self.stderr[name] = np.broadcast_to(one.stderr * scatter**0.5, size).copy()
+            values, error = np.broadcast_to(one.values, size), np.broadcast_to(one.stderr * scatter**0.5, size)
+            self.elements[name] = values.copy()
+            self.stderr[name] = np.where(np.isnan(values), np.nan, error)
 
     def _identifiable(self) -> dict[str, Identifiable]:
         """Return what can be known: of what was asked beforehand, and of what the equations determined."""

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._expansion import (
+    MORE_THAN_NOISE,
     ExpandedRecord,
     ExpandedUnknown,
     Expansion,
@@ -27,6 +28,7 @@ from tvident._expansion import (
     curve_length,
     placed,
     reach_over,
+    variances_of,
 )
 from tvident._results.curve import ExpandedParameter, of_powers
 from tvident._status import Status, untold_samples
@@ -83,6 +85,11 @@ class ExpandedFit:
         return sorted(self.search.tried.values(), key=lambda one: one.parameters)
 
     @property
+    def independent(self) -> float:
+        """How many independent equations there were, where what they leave is correlated."""
+        return self.fitted.observations / self.search.as_one
+
+    @property
     def ratio(self) -> float:
         """The mean square of the residuals over that of the noise."""
         free = self.fitted.observations - sum(one.size for one in self.unknowns)
@@ -100,11 +107,12 @@ class ExpandedFit:
         """Return the same with errors that know of residuals larger than the noise, and of their correlation."""
         if not self.ratio > 1:
             return self
-        root = (
-            self.around.root_of_residuals(self.unknowns, self.fitted)
-            if self.ratio > _core.NOISE_MODEL_FAILS
-            else self.fitted.root * np.sqrt(self.ratio)
-        )
+        root = self.fitted.root * np.sqrt(self.ratio)
+        if self.ratio > MORE_THAN_NOISE:
+            correlated = self.around.root_of_residuals(self.unknowns, self.fitted)
+            times = variances_of(correlated) / variances_of(root)
+            if self.ratio > _core.NOISE_MODEL_FAILS or np.median(times) > 1:
+                root = correlated
         return replace(self, fitted=replace(self.fitted, root=root))
 
     @property
