@@ -13,7 +13,7 @@ RIDGE = 1e-6
 """Added to the variance of a row, relative to it, so that frequencies that the test function suppresses do not count."""
 
 BLOCK = 32
-"""Times of rows in a block: more than share samples with one, which are 23 at most."""
+"""Times of rows in a block: more than share samples with one, which are some twenty at most."""
 
 
 _PROBES = 4

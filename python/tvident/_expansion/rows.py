@@ -15,8 +15,9 @@ from tvident._expansion.covariance import BLOCK
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
-ROWS_A_HALF_WIDTH = 6
-"""Rows carry all their information so many times in a half-width."""
+APART = 0.9
+"""Rows are so many standard deviations of a test function apart: nearer ones know nothing that these do not, and the less their covariance is that of
+what is next to nothing, the less its ridge hides of the noise in regressors."""
 
 _UNTOLD = 1e-12
 """Of a function's mean square: what counts as said of a function of which nothing is."""
@@ -205,7 +206,7 @@ class ExpandedRecord:
     @property
     def stride(self) -> int:
         """Samples from one time of rows to the next."""
-        return max(1, self.half // ROWS_A_HALF_WIDTH)
+        return max(1, int(APART * self.half / np.sqrt(2 * self.exponent + 3)))
 
     @property
     def length(self) -> int:
