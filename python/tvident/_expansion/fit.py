@@ -33,6 +33,9 @@ _WHOLE = (128, 32)
 """Rows and columns of what BLAS does not divide among threads, which wait for each other by turning: where other programs
 have the processors a factor that takes one thread 1.4 ms took two of them up to 245."""
 
+_LEAST_LEFT = 1e-11
+"""Of the square of the right-hand side, from which on products tell what is left of it to four digits: less is left beside a large offset."""
+
 _TO_COMPARE, _TO_SOLVE = 1e-4, 1e-2
 """Least pivots of scaled columns from which on products tell what QR decompositions do: their squares lose 8 and 4 of 16 digits."""
 
@@ -246,7 +249,7 @@ def _factor(products: Array, least: float) -> Array | None:
     for column in range(size + 1):
         # Scaled columns have squares of one: a pivot is the part of a square that the columns before do not explain.
         pivot = left[column, column]
-        if not pivot > (least**2 if column < size else least**4):
+        if not pivot > (least**2 if column < size else max(least**4, _LEAST_LEFT)):
             return None
         factor[column, column:] = left[column, column:] / np.sqrt(pivot)
         left[column + 1 :, column + 1 :] -= np.multiply.outer(*2 * (factor[column, column + 1 :],))
