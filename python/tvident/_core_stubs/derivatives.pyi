@@ -105,7 +105,7 @@ class WindowFit:
         derivatives: int,
         quantisation: float,
         weights: npt.NDArray[np.float64] | None = None,
-        least: int = 5,
+        least: int = ...,
     ) -> WindowFit: ...
     def estimate(
         self,
