@@ -34,7 +34,7 @@ _WHOLE = (128, 32)
 have the processors a factor that takes one thread 1.4 ms took two of them up to 245."""
 
 _LEAST_LEFT = 1e-11
-"""Of the square of the right-hand side, from which on products tell what is left of it to four digits: less is left beside a large offset."""
+"""Of the square of the right-hand side, from which on products tell what is left of it to four digits: beside a large offset it is less."""
 
 _TO_COMPARE, _TO_SOLVE = 1e-4, 1e-2
 """Least pivots of scaled columns from which on products tell what QR decompositions do: their squares lose 8 and 4 of 16 digits."""
