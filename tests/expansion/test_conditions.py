@@ -109,3 +109,17 @@ def test_functions_within_a_gap_are_not_determined_and_nothing_warns() -> None:
     assert result.record_status & Status.RANK_DEFICIENT
     assert not result.trusted.any()
     assert any("do not determine all functions of stiffness" in line for line in result.advice)
+
+
+def test_a_large_offset_of_the_torque_takes_no_more_functions() -> None:
+    rig = tvident.simulate_torsional_rig(duration=6.0, seed=4)
+    options: Any = {
+        "sample_rate": 1000,
+        "inertia": "constant",
+        "damping": "constant",
+        "stiffness": tvident.Expansion("bspline", of=rig.slider_position),
+    }
+    plain, moved = (tvident.identify(rig.angle, rig.torque + offset, **options) for offset in (0.0, 1e5))
+    # Products of whitened columns tell nothing of noise 1e-13 times the square of the torque.
+    assert moved.expansions["stiffness"].size == plain.expansions["stiffness"].size
+    np.testing.assert_allclose(moved.stiffness, plain.stiffness, rtol=1e-5)
