@@ -312,6 +312,14 @@ def test_windows_that_are_carried_on_into_a_mask_contradict_nothing() -> None:
     np.testing.assert_array_equal(np.isnan(windowed.stiffness), np.isnan(windowed.stderr["stiffness"]))
 
 
+def test_a_constant_that_changes_beside_a_curve_is_contradicted() -> None:
+    recorded = chain([spring, lambda t: np.where(t < 4, 18.0, 21.0)], SAMPLES, seed=7)
+    kinds = [Expansion("bspline", of=along(SAMPLES)), "constant"]
+    found = identify(recorded.angle, recorded.torque, stiffness=kinds, **OPTIONS)
+    assert found.record_status & tvident.Status.KIND_CONTRADICTED
+    assert any("stiffness_0_1 differs between parts" in one for one in found.advice)
+
+
 def test_a_curve_that_blurs_a_jump_is_contradicted() -> None:
     jump = chain([lambda t: np.where(t < 3.1, 12.0, 18.0), lambda t: 18 + 0 * t], 6000, seed=2201)
     found = identify(jump.angle, jump.torque, stiffness=[Expansion("bspline"), "constant"], **OPTIONS)

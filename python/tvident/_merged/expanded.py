@@ -16,6 +16,7 @@ from tvident._advice import found_expansion, words_of_expansions
 from tvident._derivatives import fit_local_polynomials
 from tvident._equation import COEFFICIENTS
 from tvident._expansion import (
+    MORE_THAN_NOISE,
     AlignedSamples,
     Curves,
     ExpandedRecord,
@@ -248,10 +249,15 @@ class FoundExpanded:
         for name, values in self._values.items():
             kind, of_windows = "expanded" if name in self._fit.expansions else "constant", self._of_windows[name]
             # An element of which windows of time say that it changes may be a function of a channel.
-            test = of_windows.test if kind == "constant" else None
+            test = of_windows.test if kind == "constant" and self._windows_explain else None
             place = self._names.index(name)
             found.append(FoundElement(place, kind, values, self._errors[name], test, of_windows.spread))
         return found
+
+    @property
+    def _windows_explain(self) -> bool:
+        """Whether windows leave no more than noise, or functions leave more as well; if neither, tests of parts say what windows miss."""
+        return self.windows.prediction_error <= MORE_THAN_NOISE or self._fit.ratio > MORE_THAN_NOISE
 
     @property
     def constants(self) -> list[int]:
@@ -288,7 +294,8 @@ class FoundExpanded:
         """Flags of the record."""
         of_windows = Status(self.windows.record_status)
         flags = of_windows & _KEPT | self._fit.flags | self._doubts
-        if any(one.is_contradicted for one in self._told):
+        tests = [one.test for one in self.elements if one.test is not None]
+        if any(one.is_contradicted for one in self._told) or any(one.probability < _core.NO_CHANCE for one in tests):
             flags |= Status.KIND_CONTRADICTED
         return int(flags)
 
