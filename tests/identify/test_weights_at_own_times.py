@@ -270,7 +270,10 @@ def test_an_alignment_in_seconds_goes_with_any_weights_and_one_that_is_sought_wi
     tvident.identify(angle, torque, t=(times, late), align=0.02, **{**call, "weights": some})
     with pytest.raises(ValueError, match=r"above zero, where its .*; got some of zero and align='offset'; find the"):
         tvident.identify(angle, torque, t=(times, late), align="offset", **{**call, "weights": some})
-    with pytest.raises(ValueError, match=r"those of the samples of one channel, .*; got two arrays; give one of them"):
+    with pytest.raises(ValueError, match=r"those of the samples of one channel, .*; got a pair, .*; give one array"):
         tvident.identify(angle, torque[::2], t=(times, late[::2]), weights=(weights, weights[::2]))
+    pair: Any = (weights, None)
+    with pytest.raises(ValueError, match="got a pair"):
+        tvident.identify(angle, torque[::2], t=(times, late[::2]), weights=pair)
     with pytest.raises(ValueError, match=r"got weights of the torque's samples and align='drift'; find the"):
         tvident.identify(angle, torque[::2], t=(times, late[::2]), align="drift", **{**call, "weights": weights[::2]})

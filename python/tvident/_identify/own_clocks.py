@@ -87,9 +87,10 @@ class OwnClocks:
         """
         weights, counted = None, [np.ones(one.shape, np.bool_) for one in self.recorded]
         if given is not None:
-            if _is_pair("t", given):
+            if isinstance(given, tuple | list) and any(one is None or np.ndim(one) > 0 for one in given):
                 raise ValueError(
-                    "weights must be those of the samples of one channel, for the noise of both; got two arrays; give one of them"
+                    "weights must be those of the samples of one channel, for the noise of both; got a pair, "
+                    f"{arguments.shown(given)}; give one array"
                 )
             of_torque = np.shape(given)[-1:] == self.recorded[1].shape != self.recorded[0].shape
             found = weights_of(given, self.recorded[of_torque].shape)
