@@ -150,3 +150,18 @@ def test_a_trial_without_a_channel_tells_nothing_of_the_others(dead: str) -> Non
         assert result.constants[name][0] == pytest.approx(value, abs=0.5 * error)
         assert result.constants[name][1] == pytest.approx(error, rel=0.05)
     assert result.record_status == of_others.record_status
+
+
+def test_a_sample_that_is_missing_costs_no_trust_where_windows_are_short() -> None:
+    made = simulated(4, 8000, lambda t: 15 + 4.5 * np.sin(2 * np.pi * t / 0.8), seed=5601)
+    angle = made.angle.copy()
+    angle[:, 4000] = np.nan
+    found = identify(angle, made.torque, sample_rate=1000, ensemble_axis=0)
+    assert found.settings["regression_window"][0] < 2 * found.settings["window_length"][0]
+    assert found.trusted.all()
+    # Over a second nobody knows what the stiffness does.
+    angle[:, 4000:4900] = np.nan
+    found = identify(angle, made.torque, sample_rate=1000, ensemble_axis=0)
+    assert not found.trusted[4100:4800].any()
+    error = np.abs(found.stiffness - made.stiffness)[found.trusted]
+    assert (error < 5 * found.stderr["stiffness"][found.trusted]).all()

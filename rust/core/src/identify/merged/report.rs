@@ -196,7 +196,10 @@ impl MergedSession<'_, '_, '_> {
         let condition = fit.full.field(fit.full.fields.condition());
         let mut status = vec![0; rows.len()];
         let usable = &self.whole.as_ref().unwrap_or(rows).usable;
-        let far = if windowed.is_empty() { Vec::new() } else { far_from_equations(usable, fit.span / 4) };
+        let reach = fitted.scales.first().map_or(1, |scale| scale.reach);
+        // One sample that is missing takes the rows of a test function, which short windows reach over.
+        let carried = (fit.span / 4).max(reach);
+        let far = if windowed.is_empty() { Vec::new() } else { far_from_equations(usable, carried) };
         for (time, usable) in usable.chunks(group).enumerate() {
             // What one trial misses others have; an element that is in none of the others' equations has no number.
             let lacks = || averages.values.iter().any(|column| column[time * group].is_nan());
@@ -231,7 +234,6 @@ impl MergedSession<'_, '_, '_> {
         let errors = (0..windowed.len()).map(|one| column(one, one).map(|variance| variance.max(0.0).sqrt()).collect());
         let errors: Vec<Vec<f64>> = errors.collect();
         let problem = fitted.model.problem(rows, &rows.rhs, 1.0, None);
-        let reach = fitted.scales.first().map_or(1, |scale| scale.reach);
         let untold = Magnitudes::new(&problem, &fit.pooled.values).untold(&errors, reach);
         for (status, _) in status.iter_mut().zip(untold).filter(|(_, untold)| *untold) {
             *status |= Status::ILL_CONDITIONED.bits();
