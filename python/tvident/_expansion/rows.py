@@ -15,7 +15,7 @@ from tvident._expansion.covariance import BLOCK
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
-APART = 0.9
+APART = 0.8
 """Rows are so many standard deviations of a test function apart: nearer ones know nothing that these do not, and the less their covariance
 is that of what is next to nothing, the less its ridge hides of the noise in regressors."""
 
