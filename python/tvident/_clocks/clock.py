@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
-from tvident._clocks.grid import Grid, weights_on_grid
+from tvident._clocks.grid import Grid, neighbours, weights_on_grid
 from tvident._clocks.missing import LEAST_BRIDGED, bridge_of
 from tvident._clocks.order import chosen_order, longest_bridged
 from tvident._clocks.passed import Passed
@@ -122,9 +122,7 @@ class Evened:
         """Return where on the grid the samples on both sides may be used."""
         if mask is None:
             return None
-        grid = np.arange(self.time.size)
-        left = np.clip(np.searchsorted(self.places, grid, side="right") - 1, 0, self.places.size - 1)
-        right = np.clip(np.searchsorted(self.places, grid, side="left"), 0, self.places.size - 1)
+        left, right = neighbours(self.places, np.arange(self.time.size, dtype=np.float64))
         return np.asarray(mask[..., left] & mask[..., right])
 
 

@@ -89,7 +89,7 @@ class Grid:
 
 def in_no_gap(places: Numbers, wanted: Numbers, longest: float) -> npt.NDArray[np.bool_]:
     """Return which wanted places lie between samples that are no farther apart than the longest step that is no gap."""
-    left, right = _neighbours(places, wanted)
+    left, right = neighbours(places, wanted)
     return np.asarray(places[right] - places[left] <= longest)
 
 
@@ -116,12 +116,12 @@ def weights_on_grid(places: Numbers, weights: Numbers, samples: int, *, left_out
             continue
         one[:] = 1 / np.interp(grid, places[there], 1 / np.maximum(row[there], _LEAST_WEIGHT * row.max()))
         if left_out:
-            left, right = _neighbours(places, grid)
+            left, right = neighbours(places, grid)
             one[~(there[left] & there[right])] = 0
     return found.reshape(*weights.shape[:-1], samples)
 
 
-def _neighbours(places: Numbers, wanted: Numbers) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+def neighbours(places: Numbers, wanted: Numbers) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
     """Return the last sample at or before every wanted place, and the first at or after it."""
     left = np.clip(np.searchsorted(places, wanted, side="right") - 1, 0, places.size - 1)
     return left, np.clip(np.searchsorted(places, wanted, side="left"), 0, places.size - 1)
