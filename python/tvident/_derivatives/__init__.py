@@ -1,7 +1,7 @@
 """Differentiates noisy samples: local polynomials of chosen order or window, and the Savitzky–Golay filter."""
 
 from tvident._derivatives.fit import LocalPolynomialFit
-from tvident._derivatives.local_polynomials import fit_local_polynomials
+from tvident._derivatives.local_polynomials import fit_local_polynomials, rates_of_channel
 from tvident._derivatives.plans import HIGHEST_ORDER, SHORTEST_WINDOW, plan, quantisation_step
 from tvident._derivatives.savitzky_golay import savgol_filter
 
@@ -12,5 +12,6 @@ __all__ = [
     "fit_local_polynomials",
     "plan",
     "quantisation_step",
+    "rates_of_channel",
     "savgol_filter",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any, get_args
 
+import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
@@ -369,3 +370,11 @@ def _check_left_to_the_rule(criterion: str, selection: str) -> None:
                 f"{name} chooses the order in a window that is given; got {arguments.shown(value)} with window_length='auto', which "
                 f"chooses the order too; leave {name} out or give a window"
             )
+
+
+def rates_of_channel(
+    period: float, channel: npt.NDArray[np.float64]
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Return the first and the second derivative of a channel by time, with windows that are chosen; NaN where it is missing."""
+    _, first, second = fit_local_polynomials(channel, "auto", delta=period).derivatives[:3]
+    return first, second

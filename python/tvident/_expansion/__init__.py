@@ -2,10 +2,17 @@
 
 from tvident._expansion.alignment import AlignedSamples
 from tvident._expansion.basis import Basis, Coordinate
-from tvident._expansion.coordinates import Rates, check_expansion, part_of, refuse
+from tvident._expansion.coordinates import (
+    Rates,
+    check_expansion,
+    part_of,
+    refuse,
+    refuse_windows,
+    with_channels,
+)
 from tvident._expansion.expansion import Expansion
 from tvident._expansion.families import family_from, plain_family
-from tvident._expansion.fit import MORE_THAN_NOISE, Fitted, Linearised, variances_of
+from tvident._expansion.fit import MORE_THAN_NOISE, Fitted, Linearised
 from tvident._expansion.rivals import Rival, Rivals
 from tvident._expansion.rows import (
     Curves,
@@ -31,7 +38,7 @@ from tvident._expansion.search import (
     rates_of,
 )
 from tvident._expansion.steps import variance_of_steps
-from tvident._expansion.whitened_rows import Noise
+from tvident._expansion.whitened_rows import Noise, with_least_noise
 
 __all__ = [
     "DERIVATIVES",
@@ -68,7 +75,9 @@ __all__ = [
     "rates_of",
     "reach_over",
     "refuse",
+    "refuse_windows",
     "spread_of",
     "variance_of_steps",
-    "variances_of",
+    "with_channels",
+    "with_least_noise",
 ]

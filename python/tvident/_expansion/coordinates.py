@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import NoReturn, TypeAlias
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NoReturn, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -92,6 +93,23 @@ def check_expansion(name: str, places: Places, expansion: Expansion, samples: in
                 f"shape {channel.shape} for {samples} samples",
                 "resample it",
             )
+
+
+def refuse_windows(expanded: str, kinds: Mapping[str, object]) -> None:
+    """Refuse what is followed in windows beside an expansion, of unknowns by their names."""
+    for name, kind in kinds.items():
+        if isinstance(kind, str) and kind in {"windowed", "varying"}:
+            refuse(
+                f"beside an Expansion of {expanded} all others are constant, known or expansions",
+                f"{name}={kind!r}",
+                f"say {name}='constant', or give an Expansion of time",
+            )
+
+
+def with_channels(expansion: Expansion, change: Callable[[Array], Any]) -> Expansion:
+    """Return an expansion of channels that are changed; one of time as it is."""
+    channels = tuple(map(change, expansion.channels))
+    return replace(expansion, of=channels if len(channels) > 1 else channels[0]) if channels else expansion
 
 
 def refuse(rule: str, got: str, cure: str) -> NoReturn:

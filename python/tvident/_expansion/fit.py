@@ -108,6 +108,12 @@ class Fitted:
         return float("inf") if self.factor is None else float(np.linalg.cond(self.factor))
 
     @property
+    def ratio(self) -> float:
+        """The mean square of the residuals over that of the noise."""
+        free = self.observations - self.values.size
+        return self.misfit / free if free > 0 else float("nan")
+
+    @property
     def scored(self) -> ScoredSize:
         """How well it explains the record."""
         return ScoredSize(self.values.size, np.nan if self.factor is None else self.misfit, self.observations)
@@ -169,17 +175,20 @@ class Linearised:
         for one in self._each:
             yield from one.whitened(unknowns)
 
-    def correlation(self, unknowns: Sequence[ExpandedUnknown], fitted: Fitted) -> float:
-        """Return by how much the correlation of what is left makes variances larger than those of as much white noise; at least 1."""
-        free = fitted.observations - fitted.values.size
-        if not free > 0 or not fitted.misfit > MORE_THAN_NOISE * free:
-            return 1.0
-        with np.errstate(all="ignore"):
-            times = variances_of(self.root_of_residuals(unknowns, fitted)) / variances_of(fitted.root)
-        found = float(np.median(times)) * free / fitted.misfit
-        return max(1.0, found) if np.isfinite(found) else 1.0
+    def correlation(self, unknowns: Sequence[ExpandedUnknown], fitted: Fitted) -> tuple[float, Array]:
+        """Return by how much the correlation of what is left makes variances larger than those of as much white noise, and their root.
 
-    def root_of_residuals(self, unknowns: Sequence[ExpandedUnknown], fitted: Fitted) -> Array:
+        It is 1 at least, and where no more is left than noise.
+        """
+        if not fitted.ratio > MORE_THAN_NOISE:
+            return 1.0, fitted.root
+        root = self._root_of_residuals(unknowns, fitted)
+        with np.errstate(all="ignore"):
+            times = (root**2).sum(axis=1) / (fitted.root**2).sum(axis=1)
+        found = float(np.median(times)) / fitted.ratio
+        return max(1.0, found) if np.isfinite(found) else 1.0, root
+
+    def _root_of_residuals(self, unknowns: Sequence[ExpandedUnknown], fitted: Fitted) -> Array:
         """Return a root of the covariance that follows from whitened residuals and their correlation (Newey and West), not from noise."""
         middle = np.zeros((fitted.values.size, fitted.values.size))
         if fitted.beside is not None:
@@ -190,11 +199,6 @@ class Linearised:
             return np.full_like(fitted.root, np.nan)
         squares, axes = np.linalg.eigh(middle)
         return np.asarray(fitted.root @ (axes * np.sqrt(np.maximum(squares, 0.0))))
-
-
-def variances_of(root: Array) -> Array:
-    """Return the variances that belong to a root of a covariance."""
-    return np.asarray((root**2).sum(axis=1))
 
 
 def _scores(rows: WhitenedRows, unknowns: Sequence[ExpandedUnknown], fitted: Fitted) -> Iterator[Array]:

@@ -258,8 +258,7 @@ class ExpandedRecord:
             here = [entry for entry in entries if entry[0] == equation]
             kernel = parts(here[0][1], kernels)[0]
             moved = sum(factor * self.angles[channel] for _, _, channel, factor in here)
-            windows = np.lib.stride_tricks.sliding_window_view(moved, self.length)[:: self.stride]
-            squares += np.einsum("ij,j->i", windows, kernel) ** 2 * usable[:, equation]
+            squares += np.einsum("ij,j->i", self.windows(moved), kernel) ** 2 * usable[:, equation]
             variance = sum(factor**2 * noise[channel] for _, _, channel, factor in here)
             by_noise += variance * np.sum(kernel**2) * usable[:, equation]
         around = 4 * self.lags
@@ -287,11 +286,9 @@ class ExpandedRecord:
         kernels, windows = self.kernels, [self.windows(one[samples]) for one in angles]
         found = np.zeros((len(windows[0]), self.equations, sum(one.size for one in unknowns)))
         for one, place in placed(unknowns):
-            basis = (
-                one.basis
-                if one.basis is None or self.alignment is None
-                else self.alignment.basis(one.basis, self.period)
-            )
+            basis = one.basis
+            if basis is not None and self.alignment is not None:
+                basis = self.alignment.basis(basis, self.period)
             known: dict[tuple[str, int], Array] = {}
             for equation, role, channel, factor in one.entries:
                 if (role, channel) not in known:

@@ -164,7 +164,7 @@ class SizeSearch:
             if not free or sizes == before or (turn + 1 >= _ROUNDS and self.as_one < _CORRELATED):
                 break
             before = [list(one) for one in sizes]
-            self.as_one = max(self.as_one, compared.correlation(self._unknowns(sizes), fitted))
+            self.as_one = max(self.as_one, compared.correlation(self._unknowns(sizes), fitted)[0])
         self.rivals = self._rivals(compared, sizes)
         for _ in range(_STEPS):
             last, fitted = fitted, self._solved(around, sizes)

@@ -17,9 +17,18 @@ Array: TypeAlias = npt.NDArray[np.float64]
 Noise: TypeAlias = tuple[Sequence[float], Sequence[float]]
 """Variances of the noise of every angle and of every torque."""
 
+_QUIET = 1e-9
+"""The noise of a torque counts as at least this part of the largest torque: rows without noise have no covariance."""
 
 _AT_ONCE, KEPT = 1 << 21, 1 << 22
 """Numbers of the whitened columns that are in memory at once, and of those that all records keep: 16 and 32 MiB."""
+
+
+def with_least_noise(noise: Noise, records: Sequence[ExpandedRecord]) -> Noise:
+    """Return variances of noise with which all rows of some records have a covariance."""
+    largest = max(float(np.mean(one.torques**2, axis=1).max()) for one in records)
+    least = largest * _QUIET**2 or 1.0
+    return noise[0], [max(one, least) for one in noise[1]]
 
 
 class WhitenedRows:
@@ -37,9 +46,7 @@ class WhitenedRows:
         Numbers of whitened columns that are kept.
     """
 
-    def __init__(
-        self, record: ExpandedRecord, curves: Curves, noise: Noise, known: Curves, most_kept: int = KEPT
-    ) -> None:
+    def __init__(self, record: ExpandedRecord, curves: Curves, noise: Noise, known: Curves, most_kept: int) -> None:
         self.record = record
         self._most_kept = most_kept
         curves, known = (_own(record, one) for one in (curves, known))
@@ -108,10 +115,9 @@ class WhitenedRows:
         band = np.zeros((record.rows * count, record.lags * count))
         for some, samples in record.pieces(record.lags - 1):
             entering = record.noise_kernels(self._curves, samples)
-            rhs[some] = np.stack([record.windows(one[samples]) @ self._late for one in self._torques], axis=1)
+            rhs[some] = self._averages(self._torques[:, samples], self._late)
             left[some] = rhs[some] - self._motion(entering, record.angles[:, samples])
-            torques = record.torques_of_terms(self._curves, samples)
-            left[some] -= np.stack([record.windows(one) @ record.kernels.value for one in torques], axis=1)
+            left[some] -= self._terms(self._curves, samples)
             spread = self._spread_over(entering, samples)
             for lag in range(min(record.lags, some.stop - some.start)):
                 self._add_covariance(band, some, lag, spread)
@@ -158,6 +164,14 @@ class WhitenedRows:
             found[:, equation] += np.einsum("ij,ij->i", kernels, self.record.windows(angles[channel]))
         return found
 
+    def _terms(self, curves: Curves, samples: slice) -> Array:
+        """Return what terms make of a piece's rows, shape (rows, equations)."""
+        return self._averages(self.record.torques_of_terms(curves, samples), self.record.kernels.value)
+
+    def _averages(self, torques: Array, kernel: Array) -> Array:
+        """Return the averages of torques over the windows of a piece's rows, shape (rows, equations)."""
+        return np.stack([self.record.windows(one) @ kernel for one in torques], axis=1)
+
     def _shown(self, weights: Array) -> Array:
         """Return the noise of the angles that the residuals show."""
         record, shown = self.record, np.zeros(self.record.angles.shape)
@@ -178,8 +192,7 @@ class WhitenedRows:
             if known:
                 angles = record.angles[:, samples] - shown[:, samples]
                 found[some] -= self._motion(record.noise_kernels(known, samples), angles)
-                torques = record.torques_of_terms(known, samples)
-                found[some] -= np.stack([record.windows(one) @ record.kernels.value for one in torques], axis=1)
+                found[some] -= self._terms(known, samples)
         return found
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident._advice import found_expansion, untold, words_of_expansions
 from tvident._equation import has_kind
-from tvident._expansion import Expansion, SizeSearch, check_expansion, of_one, refuse
+from tvident._expansion import Expansion, SizeSearch, check_expansion, of_one, refuse, refuse_windows
 from tvident._identify.data import Data
 from tvident._identify.expanded_inputs import ExpandedInputs, role_of
 from tvident._identify.expanded_result import ExpandedOutcome
@@ -145,13 +145,7 @@ class ExpandedTask:
 
     def _check_others(self) -> None:
         """Refuse windows beside an expansion."""
-        for name, one in self._request.parameters.items():
-            if isinstance(one, str) and one in {"windowed", "varying"}:
-                refuse(
-                    f"beside an Expansion of {next(iter(self._expansions))} all others are constant, known or expansions",
-                    f"{name}={one!r}",
-                    f"say {name}='constant', or give an Expansion of time",
-                )
+        refuse_windows(next(iter(self._expansions)), self._request.parameters)
         for term in self._request.terms:
             if isinstance(term, tuple | list) and arguments.is_word(term[1], "windowed"):
                 called = getattr(term[0], "name", term[0])

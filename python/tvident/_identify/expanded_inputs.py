@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
-from tvident._derivatives import fit_local_polynomials
+from tvident._derivatives import rates_of_channel
 from tvident._equation import COEFFICIENTS, parameter
 from tvident._expansion import (
     DERIVATIVES,
@@ -23,6 +23,7 @@ from tvident._expansion import (
     part_of,
     rates_of,
     spread_of,
+    with_least_noise,
 )
 from tvident._identify.data import Data
 from tvident._identify.settings import Request
@@ -30,9 +31,6 @@ from tvident._identify.task import Task
 from tvident._results import Identification
 
 Array = npt.NDArray[np.float64]
-
-_QUIET = 1e-9
-"""The torque's noise counts as at least this part of the torque: rows without noise have no covariance."""
 
 
 def role_of(name: str, expansion: Expansion | None) -> str:
@@ -111,6 +109,7 @@ class ExpandedInputs:
     @cached_property
     def parts(self) -> list[RecordPart]:
         """The unknowns, still without sizes."""
+        rates = partial(rates_of_channel, self.data.period)
         found, numbers = [], {name: number for number, name in enumerate(self.terms)}
         for name in (*COEFFICIENTS, *self.terms):
             expansion = self.expansions.get(name)
@@ -119,14 +118,10 @@ class ExpandedInputs:
                 if name in self.terms or name not in self.known_values:
                     found.append(RecordPart(name, entries))
                 continue
-            found.append(part_of(name, entries, expansion, (self.data.time, 1.0), self._rates))
+            found.append(part_of(name, entries, expansion, (self.data.time, 1.0), rates))
         if self.zero:
             found.append(RecordPart("angle_zero", of_one("term", len(self.terms))))
         return found
-
-    def _rates(self, channel: Array) -> tuple[Array, Array]:
-        smooth = fit_local_polynomials(channel, "auto", delta=self.data.period)
-        return smooth.derivatives[1], smooth.derivatives[2]
 
     @cached_property
     def known_values(self) -> dict[str, Array]:
@@ -176,5 +171,4 @@ class ExpandedInputs:
         # A channel tells the noise of all samples, parameters are found with that of one of mean weight.
         mean = 1.0 if self.data.weights is None else self.data.weights.spread[0]
         torque = float(shown[0]) if shown else _core.noise(self.data.torques)[0].sigma ** 2 / mean
-        least = float(np.mean(self.record.torques**2)) * _QUIET**2
-        return [angle.sigma**2 / mean], [max(torque, least) or 1.0]
+        return with_least_noise(([angle.sigma**2 / mean], [torque]), [self.record])

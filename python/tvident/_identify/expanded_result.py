@@ -15,12 +15,6 @@ from tvident._status import Status
 
 Array = npt.NDArray[np.float64]
 
-_DOUBTS = Status.KIND_CONTRADICTED | Status.SCALES_DISAGREE
-"""Flags of windows that hold for smooth functions of time, too."""
-
-_KEPT = Status.COLOURED | Status.CHANNEL_SUSPECTED
-"""Flags that windows found of the channels, whatever the equation."""
-
 
 @dataclass(frozen=True)
 class ExpandedOutcome:
@@ -112,13 +106,12 @@ class ExpandedOutcome:
 
     @property
     def doubts_of_windows(self) -> Status:
-        """What windows of time say against functions of time in their place: parts of the record, or scales, find other parameters.
+        """What windows of time say against functions of time in their place."""
+        return self.fit.doubts(self._status_of_windows)
 
-        A function of a channel may follow what no window does.
-        """
-        if not all(one.is_of_time for one in self.given.expansions.values()):
-            return Status(0)
-        return Status(int(np.asarray(self.given.pilot.record_status))) & _DOUBTS
+    @property
+    def _status_of_windows(self) -> Status:
+        return Status(int(np.asarray(self.given.pilot.record_status)))
 
     def _kinds(self) -> dict[str, str]:
         return {
@@ -128,10 +121,8 @@ class ExpandedOutcome:
         }
 
     def _record_status(self) -> Status:
-        flags = Status(int(np.asarray(self.given.pilot.record_status))) & _KEPT
-        if self.given.data.doubts:
-            flags |= Status.CHANNEL_SUSPECTED
-        return flags | self.fit.flags
+        of_times = Status.CHANNEL_SUSPECTED if self.given.data.doubts else Status(0)
+        return of_times | self.fit.flags(self._status_of_windows)
 
     def _covariances(self, step: slice) -> dict[frozenset[str], Array]:
         """Return covariances of pairs of coefficients at the samples that are wanted."""

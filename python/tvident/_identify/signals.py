@@ -13,7 +13,7 @@ from tvident import _arguments as arguments
 from tvident._clocks import Bridged, Grid, Passed, Timed, bridged, clock_of, in_no_gap, unheld
 from tvident._derivatives import quantisation_step
 from tvident._equation import has_kind
-from tvident._expansion import Expansion
+from tvident._expansion import Expansion, with_channels
 from tvident._identify.settings import Request
 from tvident._identify.weighted import Weights
 
@@ -134,10 +134,7 @@ def with_known(request: Request, change: Callable[[Any], Any], of_channel: Calla
     """Return a request whose parameters that are known at every sample are changed, and in their own way channels of expansions."""
 
     def changed(one: Any) -> Any:
-        if not isinstance(one, Expansion):
-            return change(one)
-        channels = tuple(map(of_channel, one.channels))
-        return replace(one, of=channels if len(channels) > 1 else channels[0]) if channels else one
+        return with_channels(one, of_channel) if isinstance(one, Expansion) else change(one)
 
     parameters = {name: changed(one) for name, one in request.parameters.items()}
     terms: Any = request.terms

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._equation import COEFFICIENTS, Kind, parameter
-from tvident._expansion import Expansion, Places, check_expansion, refuse
+from tvident._expansion import Expansion, Places, check_expansion, refuse, refuse_windows, with_channels
 from tvident._merged.sampling import Sampling
 
 Entry = tuple[int, int | None, int, float]
@@ -92,10 +92,9 @@ class Element:
 def on_grid(element: Element, sampling: Sampling) -> Element:
     """Return an element whose functions are of channels on a uniform grid."""
     one = element.expansion
-    if one is None or not one.channels or sampling.clock is None:
+    if one is None or sampling.clock is None:
         return element
-    channels = tuple(map(sampling.known, one.channels))
-    return replace(element, value=replace(one, of=channels if len(channels) > 1 else channels[0]))
+    return replace(element, value=with_channels(one, sampling.known))
 
 
 def kind_or_number(name: str, value: object) -> Kind | float | Expansion:
@@ -125,24 +124,19 @@ def check_expansions(elements: Sequence[Element], samples: int, *, has_momenta: 
     ValueError
         If there are any, or if momenta follow from smoothed velocities: their noise is not known.
     """
-    expanded = [one for one in elements if one.expansion is not None]
-    if expanded and has_momenta:
+    expanded = [(one, one.expansion) for one in elements if one.expansion is not None]
+    if not expanded:
+        return
+    first = expanded[0][0].name
+    if has_momenta:
         refuse(
-            f"an Expansion of {expanded[0].name} needs channels as they were recorded",
+            f"an Expansion of {first} needs channels as they were recorded",
             "a Mechanism, whose momenta follow from smoothed velocities",
             "use 'windowed', or give it one energy for each of the functions",
         )
-    for one in expanded:
-        if one.expansion is not None:
-            check_expansion(one.name, one.places, one.expansion, samples)
-    follow = [one for one in elements if isinstance(one.value, str) and one.value in {"windowed", "varying"}]
-    windowed = follow if expanded else []
-    if windowed:
-        refuse(
-            f"beside an Expansion of {expanded[0].name} all others are constant, known or expansions",
-            f"{windowed[0].name}={windowed[0].value!r}",
-            f"say {windowed[0].name}='constant', or give an Expansion of time",
-        )
+    for one, expansion in expanded:
+        check_expansion(one.name, one.places, expansion, samples)
+    refuse_windows(first, {one.name: one.value for one in elements})
 
 
 def unmentioned(name: str, given: Mapping[Any, object], known: Sequence[Any]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -13,19 +13,19 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident import _core
 from tvident._advice import found_expansion, words_of_expansions
-from tvident._derivatives import fit_local_polynomials
+from tvident._derivatives import rates_of_channel
 from tvident._equation import COEFFICIENTS
 from tvident._expansion import (
     MORE_THAN_NOISE,
     AlignedSamples,
     Curves,
     ExpandedRecord,
-    Noise,
     RecordPart,
     SizeSearch,
     part_of,
     rates_of,
     spread_of,
+    with_least_noise,
 )
 from tvident._merged.elements import Element
 from tvident._merged.predicted import Equations, TrialArrays
@@ -33,15 +33,6 @@ from tvident._results import ExpandedFit, ExpandedParameter, WindowsBeside, Word
 from tvident._status import DOUBTFUL, Status
 
 Array: TypeAlias = npt.NDArray[np.float64]
-
-_QUIET = 1e-9
-"""The noise of a torque counts as at least this part of the largest torque: rows without noise have no covariance."""
-
-_DOUBTS = Status.KIND_CONTRADICTED | Status.SCALES_DISAGREE
-"""Flags of windows that hold for smooth functions of time, too."""
-
-_KEPT = Status.COLOURED | Status.CHANNEL_SUSPECTED
-"""Flags that windows found of the channels, whatever the equations."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +79,8 @@ class ExpandedEquations:
         is_deficient = Status.RANK_DEFICIENT in Status(self.windows.record_status)
         if not self.windows.window_length or (is_deficient and bool(np.all(self.windows.status & Status.INVALID))):
             return None
-        search = SizeSearch(self._records, self._parts, self._noise, self._known)
+        noise = with_least_noise(self.windows.noise, self._records)
+        search = SizeSearch(self._records, self._parts, noise, self._known)
         found = search.run(self._start)
         expansions = self.equations.expansions
         unit_of_time = "s" if self.phase is None else ""
@@ -160,20 +152,8 @@ class ExpandedEquations:
             if expansion is None:
                 found.append(RecordPart(one.name, places))
             else:
-                found.append(part_of(one.name, places, expansion, self._along, self._rates))
+                found.append(part_of(one.name, places, expansion, self._along, partial(rates_of_channel, self.period)))
         return found
-
-    def _rates(self, channel: Array) -> tuple[Array, Array]:
-        smooth = fit_local_polynomials(channel, "auto", delta=self.period)
-        return smooth.derivatives[1], smooth.derivatives[2]
-
-    @property
-    def _noise(self) -> Noise:
-        """Variances of the noise of every angle and of every torque."""
-        angles, torques = self.windows.noise
-        largest = max(float(np.mean(one.torques**2, axis=1).max()) for one in self._records)
-        least = largest * _QUIET**2 or 1.0
-        return list(angles), [max(one, least) for one in torques]
 
     @property
     def _known(self) -> Curves:
@@ -292,8 +272,7 @@ class FoundExpanded:
     @property
     def record_status(self) -> int:
         """Flags of the record."""
-        of_windows = Status(self.windows.record_status)
-        flags = of_windows & _KEPT | self._fit.flags | self._doubts
+        flags = self._fit.flags(Status(self.windows.record_status)) | self._doubts
         tests = [one.test for one in self.elements if one.test is not None]
         if any(one.is_contradicted for one in self._told) or any(one.probability < _core.NO_CHANCE for one in tests):
             flags |= Status.KIND_CONTRADICTED
@@ -301,10 +280,8 @@ class FoundExpanded:
 
     @property
     def _doubts(self) -> Status:
-        """What windows say against functions of time in their place; a function of a channel may follow what none of them does."""
-        if not all(one.is_of_time for one in self._fit.expansions.values()):
-            return Status(0)
-        return Status(self.windows.record_status) & _DOUBTS
+        """What windows of time say against functions of time in their place."""
+        return self._fit.doubts(Status(self.windows.record_status))
 
     @cached_property
     def _told(self) -> list[Any]:

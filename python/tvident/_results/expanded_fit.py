@@ -13,7 +13,6 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._expansion import (
-    MORE_THAN_NOISE,
     ExpandedRecord,
     ExpandedUnknown,
     Expansion,
@@ -28,7 +27,6 @@ from tvident._expansion import (
     curve_length,
     placed,
     reach_over,
-    variances_of,
 )
 from tvident._results.curve import ExpandedParameter, of_powers
 from tvident._status import Status, untold_samples
@@ -41,6 +39,13 @@ _HARDLY_KNOWN = 0.1
 
 _FAR_LESS_KNOWN = 10.0
 """Error over what it usually is, from which on nothing is known where it is larger than the parameter usually is, too."""
+
+
+_DOUBTS = Status.KIND_CONTRADICTED | Status.SCALES_DISAGREE
+"""Flags of windows that hold for smooth functions of time, too."""
+
+_OF_CHANNELS = Status.COLOURED | Status.CHANNEL_SUSPECTED
+"""Flags that windows found of the channels, whatever the equations."""
 
 
 @dataclass(frozen=True)
@@ -92,8 +97,7 @@ class ExpandedFit:
     @property
     def ratio(self) -> float:
         """The mean square of the residuals over that of the noise."""
-        free = self.fitted.observations - sum(one.size for one in self.unknowns)
-        return self.fitted.misfit / free if free > 0 else float("nan")
+        return self.fitted.ratio
 
     @cached_property
     def condition(self) -> float:
@@ -107,18 +111,14 @@ class ExpandedFit:
         """Return the same with errors that know of residuals larger than the noise, and of their correlation."""
         if not self.ratio > 1:
             return self
-        root = self.fitted.root * np.sqrt(self.ratio)
-        if self.ratio > MORE_THAN_NOISE:
-            correlated = self.around.root_of_residuals(self.unknowns, self.fitted)
-            times = variances_of(correlated) / variances_of(root)
-            if self.ratio > _core.NOISE_MODEL_FAILS or np.median(times) > 1:
-                root = correlated
+        times, root = self.around.correlation(self.unknowns, self.fitted)
+        if not (times > 1 or self.ratio > _core.NOISE_MODEL_FAILS):
+            root = self.fitted.root * np.sqrt(self.ratio)
         return replace(self, fitted=replace(self.fitted, root=root))
 
-    @property
-    def flags(self) -> Status:
-        """Flags of the record that follow from the fit."""
-        flags = Status(0)
+    def flags(self, windows: Status) -> Status:
+        """Return the flags of a record: of those of windows in the place of expansions what they say of channels, and those of the fit."""
+        flags = windows & _OF_CHANNELS
         if not np.isfinite(self.condition):
             flags |= Status.RANK_DEFICIENT
         elif self.condition > _core.HARDLY_TOLD_APART:
@@ -126,6 +126,14 @@ class ExpandedFit:
         if self.ratio > _core.NOISE_MODEL_FAILS:
             flags |= Status.NOISE_MODEL
         return flags
+
+    def doubts(self, windows: Status) -> Status:
+        """Return what flags of windows say against functions of time in their place: parts of the record, or scales, find other parameters.
+
+        A function of a channel may follow what no window does.
+        """
+        is_of_time = all(one.is_of_time for one in self.expansions.values())
+        return windows & _DOUBTS if is_of_time else Status(0)
 
     @cached_property
     def curves(self) -> dict[str, ExpandedParameter]:
