@@ -17,6 +17,13 @@ use crate::regression::fit::Fit;
 use crate::regression::problem::Problem;
 use crate::simd::instructions::Instructions;
 
+/// The mean square that constants leave, over the noise's variance, from which on short parts are compared.
+pub(crate) const MORE_THAN_NOISE: f64 = 1.2;
+
+/// The part of what noise does not explain of rows that may be left where a constant that swings is set free: it is .02 to .11 where one swings, .28 to
+/// .35 where a friction or a drag is missing.
+pub(crate) const LEFT_OF_SWINGS: f64 = 0.2;
+
 /// The length of a part, in windows.
 const WINDOWS: usize = 2;
 

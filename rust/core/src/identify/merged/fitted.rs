@@ -11,7 +11,7 @@ use crate::inference::constancy::{self, Test};
 use crate::inference::cross_validation::{Validated, best, validate};
 use crate::inference::jumps::jump::Jump;
 use crate::inference::part_constants::{NoiseFrom, TestNoise};
-use crate::inference::short_parts::swinging;
+use crate::inference::short_parts::{LEFT_OF_SWINGS, MORE_THAN_NOISE, swinging};
 use crate::regression::fit::Fit;
 use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
@@ -37,11 +37,6 @@ const TRIED: usize = 3;
 
 /// Mean squared error of predicting a row, over the noise's, up to which nothing else changes.
 const WELL: f64 = 1.3;
-
-/// What is left, over the noise's variance, from which on short parts are compared, and the part of what noise does not explain that windows may leave of
-/// it which follow what swings.
-const MORE_THAN_NOISE: f64 = 1.2;
-const LEFT_OF_SWINGS: f64 = 0.2;
 
 /// Why a constant is tried in windows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

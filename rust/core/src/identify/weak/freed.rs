@@ -10,7 +10,7 @@ use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
 use crate::inference::constancy::Test;
 use crate::inference::part_constants::TestNoise;
-use crate::inference::short_parts::{Swinging, swinging};
+use crate::inference::short_parts::{LEFT_OF_SWINGS, MORE_THAN_NOISE, Swinging, swinging};
 use crate::inference::slowly_varying;
 use crate::regression::fit::Fit;
 use crate::regression::limits::NOISE_MODEL_FAILS;
@@ -23,18 +23,11 @@ const FAR_BETTER: f64 = 0.5;
 /// The same where rows are predicted well and another changes: of constants that are set free beside it for nothing .96 is left at least.
 const A_LITTLE_BETTER: f64 = 0.9;
 
-/// The part of what noise does not explain of rows that may be left where a constant that swings is set free: it is .02 to .11 where one swings, .28 to
-/// .35 where a friction or a drag is missing.
-const LEFT_OF_SWINGS: f64 = 0.2;
-
-/// The same where it is followed in windows beside constants alone: what makes a stiffness or a damping of a spring that hardens or a drag leaves .21 and more.
+/// As `LEFT_OF_SWINGS`, in windows beside constants alone: what makes a stiffness or a damping of a spring that hardens or a drag leaves .21 and more.
 const LEFT_IN_WINDOWS: f64 = 0.15;
 
-/// The same after the first round of a search, from which on it is not worth another.
+/// The part that is left after the first round of a search, from which on it is not worth another.
 const HOPELESS: f64 = 0.5;
-
-/// The mean square that constants alone leave, over the noise's variance, from which on short parts are compared.
-const MORE_THAN_NOISE: f64 = 1.2;
 
 /// Where constants jump, those that do not change in between stand unless others predict so much better.
 const SIMPLER: f64 = 0.98;
