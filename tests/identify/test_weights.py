@@ -7,6 +7,7 @@ import numpy.typing as npt
 import pytest
 
 import tvident
+from identify.half_noisy import assert_weights_help, found_alike
 
 Array = npt.NDArray[np.float64]
 
@@ -28,14 +29,6 @@ def rig(seed: int, duration: float, pattern: Any = "slider") -> tuple[Any, Array
         )
 
     return known, noisy(known.true_angle, 1e-3), noisy(known.true_torque, 2e-2), deviation**-2
-
-
-def found_alike(one: tvident.Identification, other: tvident.Identification) -> None:
-    for name in ("inertia", "damping", "stiffness", "status", "residual_std"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-    for name, errors in one.stderr.items():
-        np.testing.assert_array_equal(errors, other.stderr[name])
-    assert one.record_status == other.record_status
 
 
 @pytest.mark.parametrize("method", ["auto", "paper"])
@@ -70,22 +63,14 @@ def test_a_sample_without_weight_is_left_out_where_missing_ones_propagate() -> N
 
 @pytest.mark.slow
 def test_weights_make_errors_smaller_where_half_of_the_record_is_noisier() -> None:
-    errors: dict[str, list[float]] = {"without": [], "with": []}
-    constant: Any = dict.fromkeys(("inertia", "damping", "stiffness"), "constant")
-    standardised = []
-    for seed in range(8):
+    def identified(seed: int, has_weights: bool) -> tuple[tvident.Identification, dict[str, float]]:
         known, angle, torque, weights = rig(seed, 6.0, pattern="constant")
-        truth = {name: getattr(known, name)[0] for name in ("inertia", "stiffness")}
-        for name, given in (("without", None), ("with", weights)):
-            found = tvident.identify(angle, torque, sample_rate=RATE, weights=given, **constant)
-            errors[name].append(found.constants["inertia"][0] / truth["inertia"] - 1)
-        assert not found.record_status
-        standardised += [(found.constants[name][0] - value) / found.constants[name][1] for name, value in truth.items()]
-    rms = {name: float(np.sqrt(np.mean(np.square(values)))) for name, values in errors.items()}
-    # Least squares have the mean of both variances, 50.5, weighted ones the inverse of the mean of their inverses, 1.98.
-    assert rms["with"] < rms["without"] / 3, rms
-    # Sixteen squares of mean one: beyond these limits in 1 of 1000 cases, were they independent.
-    assert 0.23 < np.mean(np.square(standardised)) < 2.4
+        constant: Any = dict.fromkeys(("inertia", "damping", "stiffness"), "constant")
+        given = weights if has_weights else None
+        found = tvident.identify(angle, torque, sample_rate=RATE, weights=given, **constant)
+        return found, {name: getattr(known, name)[0] for name in ("inertia", "stiffness")}
+
+    assert_weights_help(identified)
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import make_interp_spline
 
 import tvident
+from identify.half_noisy import assert_weights_help, found_alike
 from parameters import examples
 from reference.weak_form import roots, rows
 from tvident._clocks import weights_on_grid
@@ -45,14 +46,6 @@ def taken(seed: int, jitter: float, duration: float, pattern: Any = "constant") 
         return np.asarray(values + noise, np.float64)
 
     return times, noisy(simulated.true_angle, 1e-3), noisy(simulated.true_torque, 2e-2), deviation**-2
-
-
-def found_alike(one: tvident.Identification, other: tvident.Identification) -> None:
-    for name in ("inertia", "damping", "stiffness", "status", "residual_std"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-    for name, errors in one.stderr.items():
-        np.testing.assert_array_equal(errors, other.stderr[name])
-    assert one.record_status == other.record_status
 
 
 @given(
@@ -166,21 +159,13 @@ def test_a_sample_without_weight_is_left_out_where_missing_ones_propagate() -> N
 @pytest.mark.slow
 @pytest.mark.parametrize("jitter", [0.3, 1.0])
 def test_weights_make_errors_smaller_where_half_of_the_record_is_noisier(jitter: float) -> None:
-    errors: dict[str, list[float]] = {"without": [], "with": []}
-    standardised = []
-    for seed in range(8):
+    # As at uniform times.
+    def identified(seed: int, has_weights: bool) -> tuple[tvident.Identification, dict[str, float]]:
         times, angle, torque, weights = taken(seed, jitter, 6.0)
-        truth = {name: float(getattr(clean(seed, 6.0, "constant"), name)[0]) for name in ("inertia", "stiffness")}
-        for name, given_weights in (("without", None), ("with", weights)):
-            found = tvident.identify(angle, torque, t=times, weights=given_weights, **CONSTANT)
-            errors[name].append(found.constants["inertia"][0] / truth["inertia"] - 1)
-        assert not found.record_status
-        standardised += [(found.constants[name][0] - value) / found.constants[name][1] for name, value in truth.items()]
-    rms = {name: float(np.sqrt(np.mean(np.square(values)))) for name, values in errors.items()}
-    # As at uniform times: weighted least squares promise a fifth.
-    assert rms["with"] < rms["without"] / 3, rms
-    # Sixteen squares of mean one: beyond these limits in 1 of 1000 cases, were they independent.
-    assert 0.23 < np.mean(np.square(standardised)) < 2.4
+        found = tvident.identify(angle, torque, t=times, weights=weights if has_weights else None, **CONSTANT)
+        return found, {name: float(getattr(clean(seed, 6.0, "constant"), name)[0]) for name in ("inertia", "stiffness")}
+
+    assert_weights_help(identified)
 
 
 @pytest.mark.slow
