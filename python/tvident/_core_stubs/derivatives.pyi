@@ -36,10 +36,10 @@ class LocalPolynomials:
         self,
         samples: npt.NDArray[np.number],
         places: Sequence[int],
-        parts: Sequence[tuple[int, int]],
+        longest_gap: int,
         least: int,
         *,
-        weights: Sequence[float] | None = None,
+        weights: npt.NDArray[np.float64] | None = None,
         workers: int | None = None,
         progress: Callable[[int, int], object] | None = None,
     ) -> IncompleteEstimates: ...

@@ -11,6 +11,7 @@ from tvident._core_stubs.regression import RollingRegressions
 
 # What pickling a stream keeps: plain, so that it can be read wherever the stream goes on. The core alone looks into it.
 _StreamState: TypeAlias = tuple[int, npt.NDArray[np.float64], int, bool]
+_PolynomialState: TypeAlias = tuple[_StreamState, int, npt.NDArray[np.float64]]
 _ParameterState: TypeAlias = tuple[list[int], list[npt.NDArray[np.float64]]]
 
 @final
@@ -48,14 +49,17 @@ class PolynomialStream:
         *,
         step: int = 1,
         errors: bool = False,
-        state: _StreamState | None = None,
+        gaps: Mapping[str, object] | None = None,
+        state: _PolynomialState | None = None,
     ) -> PolynomialStream: ...
     @property
     def delay(self) -> int: ...
     @property
     def samples(self) -> int: ...
-    def state(self) -> _StreamState: ...
-    def push(self, samples: npt.NDArray[np.number]) -> StreamedEstimates: ...
+    def state(self) -> _PolynomialState: ...
+    def push(
+        self, samples: npt.NDArray[np.number], weights: npt.NDArray[np.float64] | None = None
+    ) -> StreamedEstimates: ...
     def finish(self) -> StreamedEstimates: ...
 
 @final

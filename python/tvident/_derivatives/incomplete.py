@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,9 @@ from tvident import _core
 from tvident._status import Status
 
 Array = npt.NDArray[np.float64]
+
+Part = tuple[tuple[int, int], tuple[int, int], int]
+"""Of a record: the samples that are wanted, those that are held, and how many it has."""
 
 _FEWEST = 3
 """Samples that leave a choice of order."""
@@ -68,21 +71,35 @@ def incomplete_given(
     axis: int,
 ) -> Incomplete | None:
     """Return what is left out, as it was asked for; None where windows are to be whole."""
-    if not leaves_out(nan_policy, weights, max_gap, min_observations):
+    asked = nan_policy, max_gap, min_observations
+    rule = gaps_given(*asked, weighted=weights is not None, length=length, period=period)
+    if rule is None or weights is None:
+        return rule
+    return replace(rule, weights=weights_along(weights, shape, axis))
+
+
+def gaps_given(
+    nan_policy: str,
+    max_gap: int | str | None,
+    min_observations: int | None,
+    *,
+    weighted: bool,
+    length: int,
+    period: float,
+) -> Incomplete | None:
+    """Return the same before there are weights."""
+    if not leaves_out(nan_policy, max_gap, min_observations, weighted=weighted):
         return None
     longest = longest_gap(max_gap, period)
     least = (length + 1) // 2
     if min_observations is not None:
         least = least_given(min_observations, length)
-    given = None if weights is None else weights_along(weights, shape, axis)
-    return Incomplete(nan_policy == "omit", given, length // 2 if longest is None else longest, least)
+    return Incomplete(nan_policy == "omit", None, length // 2 if longest is None else longest, least)
 
 
-def leaves_out(
-    nan_policy: str, weights: npt.ArrayLike | None, max_gap: int | str | None, min_observations: int | None
-) -> bool:
+def leaves_out(nan_policy: str, max_gap: int | str | None, min_observations: int | None, *, weighted: bool) -> bool:
     """Return whether samples may be left out; refuse what is said of gaps where they may not."""
-    if nan_policy == "omit" or weights is not None:
+    if nan_policy == "omit" or weighted:
         return True
     for name, value in (("max_gap", max_gap), ("min_observations", min_observations)):
         if value is not None:
@@ -142,10 +159,13 @@ def filled(
     *,
     step: int,
     workers: int | None,
+    part: Part | None = None,
 ) -> Filled:
-    """Return estimates with those of windows that lack samples, or whose samples have weights."""
+    """Return estimates with those of windows that lack samples, or whose samples have weights: of a record, or of a part of one."""
     derivatives, order, status, sigma = estimates.derivatives, estimates.order, estimates.status, estimates.sigma
     leading = samples.shape[:-1]
+    # Of the samples that are held, that of the first estimate.
+    first = 0 if part is None else -(-part[0][0] // step) * step - part[1][0]
     errors: list[tuple[Any, Array]] = []
     for index in np.ndindex(leading):
         weight = None if incomplete.weights is None else incomplete.weights[index]
@@ -154,13 +174,12 @@ def filled(
         places = np.flatnonzero(wanted)
         if not places.size:
             continue
-        there = np.isfinite(samples[index]) & (True if weight is None else weight > 0)
         found = core_plan.estimate_incomplete(
             np.ascontiguousarray(samples[index]),
-            (places * step).tolist(),
-            _parts(there, incomplete.longest_gap),
+            (places * step + first).tolist(),
+            incomplete.longest_gap,
             incomplete.least,
-            weights=None if weight is None else weight.tolist(),
+            weights=None if weight is None else np.ascontiguousarray(weight),
             workers=workers,
         )
         derivatives[(slice(None), *index, places)] = found.derivatives
@@ -171,20 +190,9 @@ def filled(
         errors.append(((slice(None), *index, places), np.where(unknown, np.nan, found.stderr)))
 
     def standard_errors() -> Array:
-        computed = core_plan.errors(incomplete.plain(samples), step=step, workers=workers)
+        computed = core_plan.errors(incomplete.plain(samples), step=step, part=part, workers=workers)
         for place, values in errors:
             computed[place] = values
         return computed
 
     return Filled(derivatives, order, status, sigma, standard_errors)
-
-
-def _parts(there: npt.NDArray[np.bool_], longest_gap: int) -> list[tuple[int, int]]:
-    """Return the parts of a record between gaps that are longer, first and end of each."""
-    held = np.flatnonzero(there)
-    if not held.size:
-        return []
-    wide = np.flatnonzero(np.diff(held) - 1 > longest_gap)
-    begins = [0 if held[0] <= longest_gap else held[0], *held[wide + 1]]
-    last = there.size if there.size - 1 - held[-1] <= longest_gap else held[-1] + 1
-    return [(int(begin), int(end)) for begin, end in zip(begins, [*(held[wide] + 1), last], strict=True)]

@@ -113,7 +113,7 @@ def left_out_of_own_times(
         raise ValueError(
             f"selection must be 'window' where t is not uniform; got {arguments.shown(selection)}; leave it out, or resample the record"
         )
-    if not incomplete.leaves_out(nan_policy, weights, max_gap, min_observations):
+    if not incomplete.leaves_out(nan_policy, max_gap, min_observations, weighted=weights is not None):
         return None
     automatic = is_automatic(window_length)
     if automatic and max_gap is not None:

@@ -16,7 +16,7 @@ from tvident._identify import MOST_OF_FIRST, Method
 from tvident._pieces import Given
 from tvident._status import Status
 from tvident._stream.asked import InWeakForm, StreamWork, asked_of
-from tvident._stream.pieces import SampleStream, is_plain
+from tvident._stream.pieces import SampleStream, is_plain, not_weighted_alike
 from tvident._stream.streamed import Named, StreamedIdentification
 from tvident._stream.weak import WeakStream
 from tvident._units import ROTARY, axis_of, factor_said, scaled
@@ -306,10 +306,7 @@ class IdentificationStream(SampleStream[StreamedIdentification]):
     def _push_weighted(self, angle: Any, torque: Any, weights: npt.ArrayLike | None) -> StreamedIdentification:
         """Take the next samples with their weights."""
         if weights is None or (not self._weighted and self.samples > 0):
-            raise ValueError(
-                f"samples of a stream must all have weights, or none of them; got some {'without' if weights is None else 'with'} after "
-                f"others {'with' if weights is None else 'without'}; give weights of 1 where all samples count the same"
-            )
+            raise not_weighted_alike("samples", have=weights is not None)
         # As many as the angle has samples.
         count = np.size(angle)
         given = arguments.some_weights("weights", weights, (count,))

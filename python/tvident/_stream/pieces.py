@@ -134,6 +134,15 @@ class SampleStream(Stream[Out]):
         return times(first, count, self._step, self._period, self._start)
 
 
+def not_weighted_alike(what: str, *, have: bool) -> ValueError:
+    """Return what is wrong with samples or rows of a stream of which only some have weights: the last have, or have none."""
+    now, before = ("with", "without") if have else ("without", "with")
+    return ValueError(
+        f"{what} of a stream must all have weights, or none of them; got some {now} after others {before}; give weights of 1 where all "
+        f"{what} count the same"
+    )
+
+
 def times(first: int, count: int, step: int, period: float, start: float) -> npt.NDArray[np.float64]:
     """Return the times of some samples, every so many of them."""
     # Numbers of samples are exact as floats, which NumPy multiplies in a third of the time that whole numbers take.

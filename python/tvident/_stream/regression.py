@@ -20,7 +20,7 @@ from tvident._regression import (
     least_given,
     unit_of_weights,
 )
-from tvident._stream.pieces import Stream
+from tvident._stream.pieces import Stream, not_weighted_alike
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -243,10 +243,7 @@ class RollingStream(Stream[StreamedRegression]):
             )
         weight = None if weights is None else arguments.some_weights("weights", weights, rhs.shape[:1])
         if self._stream is not None and (weight is not None) != self._weighted:
-            raise ValueError(
-                f"rows of a stream must all have weights, or none of them; got some {'with' if weight is not None else 'without'} after "
-                f"others {'without' if weight is not None else 'with'}; give weights of 1 where all rows count the same"
-            )
+            raise not_weighted_alike("rows", have=weight is not None)
         shape = self._shape or _shape_of(regressors, rhs)
         if self._stream is None:
             windows = self._windows

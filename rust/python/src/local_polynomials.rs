@@ -11,13 +11,13 @@ use tvident::Error;
 use tvident::exec::{Watch, workers as threads};
 use tvident::lanes::Elements;
 use tvident::local_polynomials::{
-    Criterion, Estimates, Incomplete, LocalPolynomials as Plan, Order, PolynomialOptions, Selection,
+    Criterion, Estimates, Incomplete, LocalPolynomials as Plan, Order, PolynomialOptions, Selection, parts_of,
 };
 use tvident::record::Samples;
 use tvident::simd::Instructions;
 
 use crate::arrays::empty;
-use crate::records::{placed, records};
+use crate::records::{one, placed, records};
 use crate::watch::watched;
 
 /// A part of longer records: the samples that are wanted, those that are held, and all that there are.
@@ -165,26 +165,31 @@ impl LocalPolynomials {
         Ok(outputs.derivatives.into_bound(samples.py()))
     }
 
-    /// Estimates at some samples of one record from what their windows hold, within parts of the record.
-    #[pyo3(signature = (samples, places, parts, least, *, weights=None, workers=None, progress=None))]
+    /// Estimates at some samples of one record from what their windows hold, which reach across gaps of at most so many samples.
+    #[pyo3(signature = (samples, places, longest_gap, least, *, weights=None, workers=None, progress=None))]
     fn estimate_incomplete(
         &self,
         samples: &Bound<'_, PyUntypedArray>,
         places: Vec<usize>,
-        parts: Vec<(usize, usize)>,
+        longest_gap: usize,
         least: usize,
-        weights: Option<Vec<f64>>,
+        weights: Option<&Bound<'_, PyUntypedArray>>,
         workers: Option<NonZeroUsize>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<IncompleteEstimates> {
         let py = samples.py();
         let records = records(samples)?;
         let record = records.first().ok_or_else(|| PyValueError::new_err("there is no record"))?;
+        let weights = weights.map(one).transpose()?;
         let mut found = Vec::new();
         watched(py, progress, |watch| {
-            let mut values = vec![0.0; record.len()];
-            record.read(0, &mut values);
-            let parts: Vec<Range<usize>> = parts.iter().map(|&(first, end)| first..end).collect();
+            let copy = |record: &dyn Samples| {
+                let mut values = vec![0.0; record.len()];
+                record.read(0, &mut values);
+                values
+            };
+            let (values, weights) = (copy(record), weights.as_ref().map(|weights| copy(weights)));
+            let parts = parts_of(&values, weights.as_deref(), longest_gap);
             let record = Incomplete { samples: &values, weights: weights.as_deref(), parts: &parts, least };
             found = self.plan.run_incomplete(&record, &places, threads(workers), watch)?;
             Ok(())

@@ -242,3 +242,11 @@ fn number(array: &Bound<'_, PyUntypedArray>) -> PyResult<Number> {
 fn unknown(held: &Bound<'_, PyArrayDescr>) -> PyErr {
     PyTypeError::new_err(format!("cannot read numbers of type {held}"))
 }
+
+/// The only record of an array.
+pub(crate) fn one(samples: &Bound<'_, PyUntypedArray>) -> PyResult<StridedSamples> {
+    match &records(samples)?[..] {
+        [record] => Ok(*record),
+        _ => Err(PyTypeError::new_err("one record must be an array with one axis")),
+    }
+}

@@ -17,7 +17,8 @@ use tvident::stream::{
 
 use crate::arrays::{rows, zeros};
 use crate::local_polynomials::LocalPolynomials;
-use crate::streams::{elements, in_pieces, one};
+use crate::records::one;
+use crate::streams::{elements, in_pieces};
 use crate::watch::exception;
 
 /// Parameters of some samples.

@@ -11,12 +11,13 @@ use tvident::least_squares::Regressions;
 use tvident::local_polynomials::{Estimates, LocalPolynomials as Plan};
 use tvident::record::Samples;
 use tvident::stream::{
-    CorrelatedStream, PolynomialState, PolynomialStream as Polynomials, RollingState, RollingStream as Rolling,
+    CorrelatedStream, IncompleteState, IncompleteStream, PolynomialState, RollingState, RollingStream as Rolling,
+    StreamedGaps,
 };
 
 use crate::arrays::{rows, zeros};
 use crate::local_polynomials::{LocalEstimates, LocalPolynomials};
-use crate::records::{StridedSamples, records};
+use crate::records::{StridedSamples, one, records};
 use crate::rolling::{RollingRegressions, RowWindows};
 use crate::watch::exception;
 
@@ -75,23 +76,55 @@ pub(crate) struct PolynomialStream {
     plan: Arc<Plan>,
     step: usize,
     errors: bool,
-    stream: Polynomials,
+    weighted: bool,
+    stream: IncompleteStream,
 }
+
+/// What windows that lack samples reach across and must hold; whether samples are left out, and have weights.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct Gaps {
+    leaves_out: bool,
+    weighted: bool,
+    longest_gap: usize,
+    least: usize,
+}
+
+/// What a stream of polynomials goes on from: its samples, then the number of the first weight and the weights.
+type PolynomialsAt<'py> = (State<'py>, usize, Bound<'py, PyArray1<f64>>);
+
+/// The same as it was pickled.
+type PolynomialsFrom<'py> = (Stored<'py>, usize, PyReadonlyArray1<'py, f64>);
 
 #[pymethods]
 impl PolynomialStream {
     #[new]
-    #[pyo3(signature = (plan, *, step=1, errors=false, state=None))]
-    fn new(plan: &LocalPolynomials, step: usize, errors: bool, state: Option<Stored<'_>>) -> PyResult<Self> {
+    #[pyo3(signature = (plan, *, step=1, errors=false, gaps=None, state=None))]
+    fn new(
+        plan: &LocalPolynomials,
+        step: usize,
+        errors: bool,
+        gaps: Option<Gaps>,
+        state: Option<PolynomialsFrom<'_>>,
+    ) -> PyResult<Self> {
         let plan = plan.shared();
         let state = match state {
-            None => PolynomialState::default(),
-            Some((first, samples, given, ended)) => {
-                PolynomialState { first, samples: samples.as_slice()?.to_vec(), given, ended }
-            }
+            None => IncompleteState::default(),
+            Some(((first, samples, given, ended), first_weight, weights)) => IncompleteState {
+                samples: PolynomialState { first, samples: samples.as_slice()?.to_vec(), given, ended },
+                first_weight,
+                weights: weights.as_slice()?.to_vec(),
+            },
         };
-        let stream = Polynomials::resume(Arc::clone(&plan), step, errors, state).map_err(|error| exception(&error))?;
-        Ok(Self { plan, step, errors, stream })
+        let gaps = gaps.map(|Gaps { leaves_out, weighted, longest_gap, least }| StreamedGaps {
+            leaves_out,
+            weighted,
+            longest_gap,
+            least,
+        });
+        let weighted = gaps.is_some_and(|gaps| gaps.weighted);
+        let stream = IncompleteStream::resume(Arc::clone(&plan), step, errors, gaps, state);
+        Ok(Self { plan, step, errors, weighted, stream: stream.map_err(|error| exception(&error))? })
     }
 
     /// Samples from one to its estimate.
@@ -107,19 +140,33 @@ impl PolynomialStream {
     }
 
     /// What resuming needs.
-    fn state<'py>(&self, py: Python<'py>) -> State<'py> {
-        let state = self.stream.state();
-        (state.first, PyArray1::from_vec(py, state.samples), state.given, state.ended)
+    fn state<'py>(&self, py: Python<'py>) -> PolynomialsAt<'py> {
+        let IncompleteState { samples, first_weight, weights } = self.stream.state();
+        let state = (samples.first, PyArray1::from_vec(py, samples.samples), samples.given, samples.ended);
+        (state, first_weight, PyArray1::from_vec(py, weights))
     }
 
-    /// Takes in samples, and returns the estimates that they settle.
-    fn push(&mut self, samples: &Bound<'_, PyUntypedArray>) -> PyResult<StreamedEstimates> {
+    /// Takes in samples, with weights if the stream has them, and returns the estimates that they settle.
+    #[pyo3(signature = (samples, weights=None))]
+    fn push(
+        &mut self,
+        samples: &Bound<'_, PyUntypedArray>,
+        weights: Option<&Bound<'_, PyUntypedArray>>,
+    ) -> PyResult<StreamedEstimates> {
         let py = samples.py();
         let record = one(samples)?;
+        if weights.is_some() != self.weighted {
+            return Err(PyTypeError::new_err("samples of a stream all have weights, or none has"));
+        }
+        let weights = weights.map(one).transpose()?;
         let given = self.stream.upcoming(record.len());
         let stream = &mut self.stream;
         outputs(py, &self.plan, given, self.step, self.errors, |estimates, errors| {
-            in_pieces(py, record.len(), |samples| stream.push(&Part { record: &record, samples }, estimates, errors))
+            in_pieces(py, record.len(), |samples| {
+                let weights = weights.as_ref().map(|record| Part { record, samples: samples.clone() });
+                let weights = weights.as_ref().map(|weights| weights as &dyn Samples);
+                stream.push(&Part { record: &record, samples }, weights, estimates, errors);
+            })
         })
     }
 
@@ -180,14 +227,6 @@ fn outputs(
         sigma: sigma.unbind(),
     };
     Ok(StreamedEstimates { first: elements.first, estimates: Py::new(py, estimates)?, stderr: errors.unbind() })
-}
-
-/// The only record of an array.
-pub(crate) fn one(samples: &Bound<'_, PyUntypedArray>) -> PyResult<StridedSamples> {
-    match &records(samples)?[..] {
-        [record] => Ok(*record),
-        _ => Err(PyTypeError::new_err("a stream takes one record: an array with one axis")),
-    }
 }
 
 /// Standard errors know of correlated residuals, or not.

@@ -32,6 +32,6 @@ pub use basis::Basis;
 pub use boundary::End;
 pub use criterion::Criterion;
 pub use estimates::Estimates;
-pub use incomplete::{Incomplete, IncompleteEstimate};
+pub use incomplete::{Incomplete, IncompleteEstimate, parts_of};
 pub use options::{HIGHEST_ORDER, Order, PolynomialOptions, Selection};
 pub use plan::LocalPolynomials;

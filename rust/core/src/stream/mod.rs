@@ -2,6 +2,7 @@
 
 pub(crate) mod constants;
 pub(crate) mod correlated_rows;
+pub(crate) mod incomplete_polynomials;
 pub(crate) mod polynomials;
 pub(crate) mod rolling;
 pub(crate) mod rows;
@@ -9,6 +10,7 @@ pub(crate) mod windowed;
 
 pub use constants::{ConstantState, ConstantStream};
 pub use correlated_rows::CorrelatedStream;
+pub use incomplete_polynomials::{IncompleteState, IncompleteStream, StreamedGaps};
 pub use polynomials::{PolynomialState, PolynomialStream};
 pub use rolling::{RollingState, RollingStream};
 pub use windowed::{

@@ -113,7 +113,7 @@ impl PolynomialStream {
     }
 
     /// The first sample that is still needed.
-    fn needed_from(&self) -> usize {
+    pub(crate) fn needed_from(&self) -> usize {
         self.plan.reads_from(self.given).min(self.given.saturating_sub(self.neighbours))
     }
 

@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::exec::pool::GoOn;
 use crate::exec::stages::Stages;
 use crate::local_polynomials::estimates::Estimates;
-use crate::local_polynomials::incomplete::{Incomplete, IncompleteEstimate};
+use crate::local_polynomials::incomplete::{Incomplete, IncompleteEstimate, parts_between_gaps};
 use crate::local_polynomials::plan::LocalPolynomials;
 use crate::record::samples::{Samples, all_usable, is_usable};
 use crate::status::Status;
@@ -37,7 +37,7 @@ struct Lacking {
 impl Lacking {
     fn of(plan: &LocalPolynomials, samples: &[f64], is_wanted: impl Fn(usize) -> bool) -> Self {
         let (length, before) = (plan.options().window_length, plan.before_centre());
-        let parts = parts_between_gaps(samples, longest_gap(plan));
+        let parts = parts_between_gaps(samples.len(), longest_gap(plan), |sample| is_usable(samples[sample]));
         let mut places = Vec::new();
         for part in &parts {
             let centres = part.start + before..(part.end + before + 1).saturating_sub(length).max(part.start + before);
@@ -151,18 +151,6 @@ impl BesideGaps {
             estimates.status[element] = flags_of(&found);
         }
     }
-}
-
-/// The parts of a record between gaps that are longer than some samples.
-fn parts_between_gaps(samples: &[f64], longest: usize) -> Vec<Range<usize>> {
-    let mut parts: Vec<Range<usize>> = Vec::new();
-    for sample in (0..samples.len()).filter(|&sample| is_usable(samples[sample])) {
-        match parts.last_mut() {
-            Some(part) if sample - part.end <= longest => part.end = sample + 1,
-            _ => parts.push(sample..sample + 1),
-        }
-    }
-    parts
 }
 
 #[cfg(test)]
