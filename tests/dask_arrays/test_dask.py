@@ -100,6 +100,60 @@ def test_derivatives_have_them_too(cuts: list[int], step: int, half: int, select
         assert values.tobytes() == np.ascontiguousarray(getattr(whole, name)).tobytes(), name
 
 
+@settings(max_examples=examples(8))
+@given(
+    cuts=cuts,
+    step=st.sampled_from([1, 7]),
+    half=st.integers(5, 60),
+    weighted=st.booleans(),
+    policy=st.sampled_from(["omit", "propagate"]),
+    max_gap=st.sampled_from([None, 3, 900]),
+)
+def test_derivatives_beside_gaps_and_with_weights_have_them(
+    cuts: list[int], step: int, half: int, weighted: bool, policy: Any, max_gap: int | None
+) -> None:
+    cuts = [cut // 10 + 1 for cut in cuts]
+    generator = np.random.default_rng(sum(cuts))
+    samples = sum(cuts) + 2 * half + 1
+    y = np.sin(np.arange(samples) / 30) + 1e-3 * generator.standard_normal(samples)
+    y[generator.integers(0, samples, samples // 300)] = np.nan
+    for length in (half, 800):
+        first = generator.integers(0, samples)
+        y[first : first + length] = np.nan
+    weights = np.where(generator.random(samples) < 0.01, 0.0, 10 ** generator.uniform(-1, 1, samples))
+    more: dict[str, Any] = {"sample_rate": 100, "step": step, "nan_policy": policy}
+    if weighted or policy == "omit":
+        more["max_gap"] = max_gap
+    length = 2 * half + 1
+    whole = tvident.fit_local_polynomials(y, length, weights=weights if weighted else None, **more)
+    chunks = ((*cuts, length),)
+    found = tvident.dask.fit_local_polynomials(
+        chunked(y, chunks), length, weights=chunked(weights, (samples,)) if weighted else None, **more
+    )
+    names = ("derivatives", "stderr", "order", "sigma", "status")
+    for name, values in zip(
+        names, dask.compute(*(getattr(found, one) for one in names), scheduler="synchronous"), strict=True
+    ):
+        assert values.tobytes() == np.ascontiguousarray(getattr(whole, name)).tobytes(), name
+
+
+def test_a_batch_has_weights_for_each_record_or_for_all() -> None:
+    generator = np.random.default_rng(3)
+    y, weights = generator.standard_normal((2, 900)), generator.uniform(0.1, 2, (2, 900))
+    for one in (weights, weights[0]):
+        found = tvident.dask.fit_local_polynomials(chunked(y, (1, 400)), 31, weights=chunked(one, -1))
+        whole = tvident.fit_local_polynomials(y, 31, weights=one)
+        assert np.array_equal(found.derivatives.compute(scheduler="synchronous"), whole.derivatives)
+    with pytest.raises(ValueError, match="weights must have one value for every sample"):
+        tvident.dask.fit_local_polynomials(chunked(y, (1, 400)), 31, weights=chunked(weights[:, 1:], -1))
+    with pytest.raises(ValueError, match="max_gap must go with nan_policy='omit' or weights"):
+        tvident.dask.fit_local_polynomials(chunked(y, (1, 400)), 31, max_gap=3)
+    y[1, 700] = np.nan
+    raising = tvident.dask.fit_local_polynomials(chunked(y, (1, 400)), 31, nan_policy="raise")
+    with pytest.raises(ValueError, match="samples 400 to 800 must be finite; some are not"):
+        raising.order.compute(scheduler="synchronous")
+
+
 def test_two_processes_have_the_bits_of_one_call(rig: tvident.Recording, client: Client) -> None:
     assert len(client.scheduler_info()["workers"]) == 2
     angle, torque = (chunked(one, 9_000) for one in (rig.angle, rig.torque))

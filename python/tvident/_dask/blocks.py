@@ -56,6 +56,16 @@ def samples_of(name: str, values: Any, hidden: float = np.nan) -> Any:
     return values if arguments.is_read_as_it_is(values.dtype) else values.astype(np.float64)
 
 
+def weights_of(weights: Any, shape: tuple[int, ...]) -> Any:
+    """Return weights of samples of some shape."""
+    found = samples_of("weights", weights, hidden=0.0)
+    if found.shape not in {shape, shape[-1:]}:
+        raise ValueError(
+            f"weights must have one value for every sample, shape {shape} or {shape[-1:]}; got {found.shape}; check what was read"
+        )
+    return imported()[1].broadcast_to(found, shape)
+
+
 def _cure(name: str, values: Any) -> str:
     """Return how something that is no dask array becomes one."""
     _, array = imported()

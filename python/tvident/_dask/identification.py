@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tvident import _arguments as arguments
-from tvident._dask.blocks import imported, samples_of, stacked
+from tvident._dask.blocks import imported, samples_of, stacked, weights_of
 from tvident._dask.found import DaskIdentification
 from tvident._dask.records import record_of
 from tvident._equation import LINEAR_UNITS, UNITS, GivenTerm
@@ -123,7 +123,7 @@ def identify(
     given = Given(method, equation, settings, nan_policy, period, axis, 1, weights is not None)
     channels = [_scaled(angle, axis.angle), _scaled(torque, axis.torque)]
     if weights is not None:
-        channels.append(_weights(weights, angle.shape))
+        channels.append(weights_of(weights, angle.shape))
     each = [record_of([one[place] for one in channels], given, every) for place in np.ndindex(*batch)]
     columns = {name: stacked([one.columns[name] for one in each], batch) for name in each[0].columns}
     time = array.arange(0, samples, every, chunks=max(samples // every, 1), dtype=float) * period
@@ -135,16 +135,6 @@ def identify(
         units,
         dask.delayed(_of_batch)([one.told for one in each], batch),
     )
-
-
-def _weights(weights: Any, shape: tuple[int, ...]) -> Any:
-    """Return weights of samples of some shape."""
-    found = samples_of("weights", weights, hidden=0.0)
-    if found.shape not in {shape, shape[-1:]}:
-        raise ValueError(
-            f"weights must have one value for every sample, shape {shape} or {shape[-1:]}; got {found.shape}; check what was read"
-        )
-    return imported()[1].broadcast_to(found, shape)
 
 
 def _scaled(samples: Any, factor: float) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, get_args
 
 import numpy as np
@@ -11,8 +11,18 @@ import numpy as np
 from tvident import _arguments as arguments
 from tvident import _core
 from tvident._choices import Criterion, Selection
-from tvident._dask.blocks import blocks, imported, joined, rows, samples_of, stacked
-from tvident._derivatives import HIGHEST_ORDER, SHORTEST_WINDOW, plan, quantisation_step
+from tvident._dask.blocks import blocks, imported, joined, rows, samples_of, stacked, weights_of
+from tvident._derivatives import (
+    HIGHEST_ORDER,
+    SHORTEST_WINDOW,
+    Incomplete,
+    Part,
+    check_weighted,
+    filled,
+    gaps_given,
+    plan,
+    quantisation_step,
+)
 from tvident._identify import Span
 
 _REACH = 3
@@ -72,6 +82,10 @@ def fit_local_polynomials(
     selection: Selection = "window",
     max_deriv: int = 2,
     step: int = 1,
+    weights: Any = None,
+    nan_policy: arguments.RowPolicy = "propagate",
+    max_gap: int | str | None = None,
+    min_observations: int | None = None,
     quantisation: float | None = None,
 ) -> DaskPolynomialFit:
     r"""Differentiate the samples of a dask array, with the bits that :func:`tvident.fit_local_polynomials` gives in memory.
@@ -83,8 +97,11 @@ def fit_local_polynomials(
         missing, as NaN is.
     window_length : int or str
         Samples in a window, or a duration such as ``"0.2 s"``.
-    delta, sample_rate, max_order, order, criterion, selection, max_deriv, step, quantisation : optional
-        As in :func:`tvident.fit_local_polynomials`.
+    weights : dask.array.Array, shape (\*, n) or (n,), optional
+        One over the variance of the noise at every sample, relative to the others, and 0 where it is not to be used.
+    delta, sample_rate, max_order, order, criterion, selection, max_deriv, step : optional
+    nan_policy, max_gap, min_observations, quantisation : optional
+        As in :func:`tvident.fit_local_polynomials`. With ``nan_policy="raise"`` a block that holds no number raises when it is computed.
 
     Returns
     -------
@@ -103,8 +120,9 @@ def fit_local_polynomials(
     Notes
     -----
     Every block is one task on one thread: dask has as many threads as there is to do. Windows begin at places that depend on the number of
-    a sample in the whole record alone, so the chunks of an array do not change the bits. A block reads three windows of its neighbours.
-    The cost is that of the call in memory, and some milliseconds a task.
+    a sample in the whole record alone, so the chunks of an array do not change the bits. A block reads three windows of its neighbours,
+    or a window and the longest gap that windows reach across, where that is more. The cost is that of the call in memory, and some
+    milliseconds a task.
 
     See Also
     --------
@@ -152,23 +170,31 @@ def fit_local_polynomials(
         "noise": True,
     }
     plan(length, **fixed)  # what is impossible is refused at once
+    arguments.one_of("nan_policy", nan_policy, get_args(arguments.RowPolicy))
+    weighted = weights is not None
+    gaps = gaps_given(nan_policy, max_gap, min_observations, weighted=weighted, length=length, period=seconds)
+    if weighted:
+        check_weighted(automatic=False, weighted=True, selection=selection, loss="squares")
+        weights = weights_of(weights, y.shape)
     samples, batch = y.shape[-1], y.shape[:-1]
     records = [y[place] for place in np.ndindex(*batch)]
     if quantisation is None:
         step_of_rounding = dask.delayed(min)([rounding(one) for one in records])
     else:
         step_of_rounding = quantisation_step(np.zeros(1), quantisation)
+    asked = AskedOfBlocks(length, fixed, every, gaps, nan_policy == "raise")
     work, errors = dask.delayed(_block, pure=True), dask.delayed(_errors, pure=True)
     each = []
-    for record in records:
-        found = blocks(record.chunks[-1], _REACH * length)
+    for place, record in zip(np.ndindex(*batch), records, strict=True):
+        found = blocks(record.chunks[-1], asked.reach)
         counts = [rows(block, every) for block in found]
         parts, stderr = [], []
         for block in found:
-            held = max(block[0] - _REACH * length, 0), min(block[1] + _REACH * length, samples)
-            asked = record[slice(*held)], (block, held, samples), every, (length, fixed), step_of_rounding
-            parts.append(work(*asked))
-            stderr.append(errors(*asked))
+            held = max(block[0] - asked.reach, 0), min(block[1] + asked.reach, samples)
+            weight = None if weights is None else weights[place][slice(*held)]
+            given = record[slice(*held)], weight, (block, held, samples), asked, step_of_rounding
+            parts.append(work(*given))
+            stderr.append(errors(*given))
         one = {
             name: joined([part[name] for part in parts], counts, kind, lead)
             for name, (kind, lead) in {
@@ -197,17 +223,52 @@ def _rounding(samples: Any, spans: list[Span], of: int) -> float:
     return _core.quantisation_step(samples, parts=spans, of=of)
 
 
-Asked = tuple[Span, Span, int]
-"""The samples that are wanted, those that are held, and how many the record has."""
+@dataclass(frozen=True)
+class AskedOfBlocks:
+    """What is done with every block.
+
+    Parameters
+    ----------
+    length : int
+        Samples in a window.
+    fixed : Mapping
+        What else its tables depend on.
+    step : int
+    gaps : Incomplete or None
+        What is left out, before there are weights.
+    raises : bool
+        Whether nothing may be missing.
+    """
+
+    length: int
+    fixed: Mapping[str, Any]
+    step: int
+    gaps: Incomplete | None
+    raises: bool
+
+    @property
+    def reach(self) -> int:
+        """Samples on either side of a block that have a part in its estimates."""
+        beside_gaps = 0 if self.gaps is None else self.length + self.gaps.longest_gap
+        return max(_REACH * self.length, beside_gaps)
+
+    def plan(self, quantisation: float) -> _core.LocalPolynomials:
+        """Return the tables for samples that were rounded to a step."""
+        return plan(self.length, **self.fixed, quantisation=quantisation)
 
 
-def _block(
-    samples: Any, part: Asked, step: int, tables: tuple[int, Mapping[str, Any]], quantisation: float
-) -> dict[str, Any]:
+def _block(samples: Any, weights: Any, part: Part, asked: AskedOfBlocks, quantisation: float) -> dict[str, Any]:
     """Return the estimates of one block, on one thread: dask has others."""
-    length, fixed = tables
-    core_plan = plan(length, **fixed, quantisation=quantisation)
-    found = core_plan.estimate(np.ascontiguousarray(samples), step=step, part=part, workers=1)
+    first, end = part[0]
+    samples = np.ascontiguousarray(samples)
+    if asked.raises and not np.isfinite(samples[first - part[1][0] : end - part[1][0]]).all():
+        raise ValueError(f"samples {first} to {end} must be finite; some are not; use nan_policy='omit' or 'propagate'")
+    core_plan, gaps = asked.plan(quantisation), _gaps(asked, weights)
+    whole = samples if gaps is None else gaps.plain(samples)
+    found = core_plan.estimate(whole, step=asked.step, part=part, workers=1)
+    if gaps is not None:
+        # Into the arrays of the estimates.
+        filled(core_plan, found, samples, gaps, step=asked.step, workers=1, part=part)
     return {
         "derivatives": found.derivatives,
         "order": found.order,
@@ -216,8 +277,18 @@ def _block(
     }
 
 
-def _errors(samples: Any, part: Asked, step: int, tables: tuple[int, Mapping[str, Any]], quantisation: float) -> Any:
+def _errors(samples: Any, weights: Any, part: Part, asked: AskedOfBlocks, quantisation: float) -> Any:
     """Return their standard errors."""
-    length, fixed = tables
-    core_plan = plan(length, **fixed, quantisation=quantisation)
-    return core_plan.errors(np.ascontiguousarray(samples), step=step, part=part, workers=1)
+    samples = np.ascontiguousarray(samples)
+    core_plan, gaps = asked.plan(quantisation), _gaps(asked, weights)
+    if gaps is None:
+        return core_plan.errors(samples, step=asked.step, part=part, workers=1)
+    found = core_plan.estimate(gaps.plain(samples), step=asked.step, part=part, workers=1)
+    return filled(core_plan, found, samples, gaps, step=asked.step, workers=1, part=part).errors()
+
+
+def _gaps(asked: AskedOfBlocks, weights: Any) -> Incomplete | None:
+    """Return what is left out of one block."""
+    if asked.gaps is None or weights is None:
+        return asked.gaps
+    return replace(asked.gaps, weights=arguments.some_weights("weights", weights, weights.shape))
