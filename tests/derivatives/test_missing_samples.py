@@ -214,25 +214,40 @@ def test_windows_that_lack_samples_have_orders_of_their_own_beside_others(select
 
 
 @pytest.mark.slow
-def test_hubers_loss_leaves_out_what_is_missing() -> None:
+@pytest.mark.parametrize("weighted", [False, True])
+def test_hubers_loss_leaves_out_what_is_missing(weighted: bool) -> None:
     generator = np.random.default_rng(6)
-    y = np.sin(np.arange(120) / 9) + 0.05 * generator.standard_normal(120)
+    weights = 10 ** generator.uniform(-1, 1, 120) if weighted else np.ones(120)
+    weights[50] = 0 if weighted else 1
+    y = np.sin(np.arange(120) / 9) + 0.05 * generator.standard_normal(120) / np.sqrt(np.where(weights > 0, weights, 1))
     y[generator.integers(0, 120, 6)] += 3
     y[[30, 31, 77]] = np.nan
-    length, order = 21, 3
+    length, order, used = 21, 3, np.isfinite(y) & (weights > 0)
+    roots = np.sqrt(np.where(weights > 0, weights, 1))
 
     def values(sides: Array, derivative: int = 0) -> Array:
-        each = [fitted(sides, np.ones(120), place, length, order, order)[0][derivative] for place in range(120)]
+        each = [fitted(sides, weights, place, length, order, order)[0][derivative] for place in range(120)]
         return np.array(each)
 
-    clipped = pseudo_values(lambda sides: values(sides[:, 0])[:, None], y[:, None], np.isfinite(y), length, 5)[:, 0]
+    def solve(sides: Array) -> Array:
+        return np.asarray((roots * values(sides[:, 0] / roots))[:, None])
+
+    # Residuals times the roots of weights have one scale.
+    clipped = pseudo_values(solve, (roots * y)[:, None], used, length, 5)[:, 0] / roots
     assert np.nanmax(np.abs(clipped - y)) > 2
     found = tvident.fit_local_polynomials(
-        np.stack([y, np.arange(120.0)]), length, order=order, nan_policy="omit", loss="huber"
+        np.stack([y, np.arange(120.0)]),
+        length,
+        order=order,
+        nan_policy="omit",
+        loss="huber",
+        weights=weights if weighted else None,
     )
     for derivative in range(3):
         expected = values(clipped, derivative)
         np.testing.assert_allclose(found.derivatives[derivative, 0], expected, rtol=0, atol=ROUNDING)
+    if weighted:
+        return
     automatic = tvident.fit_local_polynomials(y, "auto", nan_policy="omit", loss="huber")
     # Some standard deviations of the noise, and a tenth of a spike.
     assert np.nanmax(np.abs(automatic.derivatives[0] - np.sin(np.arange(120) / 9))) < 0.3
@@ -249,7 +264,6 @@ def test_hubers_loss_leaves_out_what_is_missing() -> None:
             {"selection": "pooled", "weights": np.ones(100)},
             "selection must be 'window' where .* weights .*; got 'pooled'",
         ),
-        ({"loss": "huber", "weights": np.ones(100)}, "loss must be 'squares' where .* weights .*; got 'huber'"),
         (
             {"nan_policy": "propagate", "max_gap": 3},
             "max_gap must go with nan_policy='omit' or weights; got 3 with 'prop",

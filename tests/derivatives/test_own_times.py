@@ -306,6 +306,23 @@ def test_hubers_loss_is_that_of_windows_at_true_times() -> None:
         np.testing.assert_allclose(found.derivatives[derivative], expected, rtol=0, atol=SAME * np.abs(expected).max())
 
 
+def test_hubers_loss_goes_with_weights_at_true_times() -> None:
+    times, y = record(3, 400)
+    weights = np.where(np.arange(400) < 200, 1.0, 1e-4)
+    y += 1e-2 * np.random.default_rng(0).standard_normal(400) / np.sqrt(weights)
+    spiky = y.copy()
+    spiky[50:400:70] += 9
+    call: dict[str, Any] = {"t": times, "order": 2, "weights": weights}
+    without, spoilt = (tvident.fit_local_polynomials(one, 31, **call).derivatives[0] for one in (y, spiky))
+    clipped = tvident.fit_local_polynomials(spiky, 31, loss="huber", **call).derivatives[0]
+    quiet = slice(40, 180)
+    # Noise of .01 where weights are one: spikes of 900 deviations move what is estimated by far less than one.
+    assert np.abs(clipped - without)[quiet].max() < 0.02
+    assert np.abs(spoilt - without)[quiet].max() > 0.2
+    # A residual of nine deviations or more is a spike; of one where the noise is a hundred times larger, it is none.
+    assert np.abs(clipped - without)[240:].max() < 1
+
+
 def test_times_too_irregular_for_a_choice_say_so() -> None:
     times = np.sort(np.random.default_rng(0).uniform(0, 5, 1000))
     with pytest.raises(ValueError, match=r"scatter by no more than 1\.5 of a step; .* give a duration"):
@@ -324,7 +341,6 @@ def test_times_too_irregular_for_a_choice_say_so() -> None:
         ({"window_length": 21, "max_gap": 3}, "max_gap must go with nan_policy='omit' or weights; got 3"),
         ({"window_length": "auto", "nan_policy": "omit", "max_gap": 3}, "max_gap must be left out where t is not unif"),
         ({"window_length": "auto", "weights": np.ones(100)}, "window_length must be a length where samples have weigh"),
-        ({"window_length": 21, "loss": "huber", "weights": np.ones(100)}, "loss must be 'squares' where samples have"),
         ({"window_length": 21, "weights": np.ones(99)}, r"one value for every sample, shape \(100,\); got shape"),
         ({"window_length": 21, "nan_policy": "omit", "min_observations": 22}, "min_observations must be at most 21"),
         ({"window_length": "9 s"}, "less than or equal to the length of the record; got 9 s for a record of"),

@@ -174,7 +174,7 @@ def fit_local_polynomials(
     weighted = weights is not None
     gaps = gaps_given(nan_policy, max_gap, min_observations, weighted=weighted, length=length, period=seconds)
     if weighted:
-        check_weighted(automatic=False, weighted=True, selection=selection, loss="squares")
+        check_weighted(automatic=False, weighted=True, selection=selection)
         weights = weights_of(weights, y.shape)
     samples, batch = y.shape[-1], y.shape[:-1]
     records = [y[place] for place in np.ndindex(*batch)]

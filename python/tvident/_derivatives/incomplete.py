@@ -136,12 +136,11 @@ def left_out(length: int, longest_gap: int | None) -> Incomplete:
     return Incomplete(omit=True, weights=None, longest_gap=longest, least=(length + 1) // 2)
 
 
-def check_weighted(*, automatic: bool, weighted: bool, selection: str, loss: str) -> None:
+def check_weighted(*, automatic: bool, weighted: bool, selection: str) -> None:
     """Check what does not go with weights, of which every window is decomposed on its own, or with a least number of samples."""
     wrong = [
         ("window_length", "a length", "'auto'", automatic),
         ("selection", "'window'", repr(selection), weighted and selection != "window"),
-        ("loss", "'squares'", repr(loss), weighted and loss != "squares"),
     ]
     for name, right, got, is_wrong in wrong:
         if is_wrong:

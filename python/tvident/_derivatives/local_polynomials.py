@@ -84,7 +84,8 @@ def fit_local_polynomials(
         estimates of all orders are averaged with Akaike weights :math:`w_n ∝ \exp(-AICc_n/2)`.
     loss : {"squares", "huber"}, optional
         ``"huber"``: residuals of the value beyond 1.345 standard deviations count linearly, so that spikes move estimates by little,
-        however large they are (Huber 1981, modified residuals). Some 10 to 40 fits are made.
+        however large they are (Huber 1981, modified residuals); with `weights` these are standard deviations of each sample's own. Some
+        10 to 40 fits are made.
     max_deriv : int, optional
         Highest derivative wanted, at most 15.
     axis : int, optional
@@ -133,8 +134,8 @@ def fit_local_polynomials(
         If the window is even, shorter than 5 samples or longer than the record, if an order is too high, if `t` does not increase, if
         `y` spans more than one and a half of `period`, or if a name is unknown. With ``"auto"``, if the record has fewer than 64
         samples, if no order reaches `max_deriv`, or if `criterion` or `selection` is given. With `weights`, if orders are pooled or
-        averaged, or the loss is Huber's; with `weights` or `min_observations`, and with Huber's loss where `t` is not uniform, if the
-        window is ``"auto"``. Where `t` is not uniform, if orders are pooled or averaged, or with `max_gap` if the window is ``"auto"``.
+        averaged; with `weights` or `min_observations`, and with Huber's loss where `t` is not uniform, if the window is ``"auto"``.
+        Where `t` is not uniform, if orders are pooled or averaged, or with `max_gap` if the window is ``"auto"``.
     TypeError
         If `y` is complex or holds no numbers, or a number is not whole.
 
@@ -263,7 +264,6 @@ def fit_local_polynomials(
             axis=axis,
             window_length=window_length,
             selection=selection,
-            loss=loss,
         )
         found = at_own_times(
             samples,
@@ -302,7 +302,7 @@ def fit_local_polynomials(
         )
     )
     if incomplete is not None:
-        check_weighted(automatic=automatic, weighted=weights is not None, selection=selection, loss=loss)
+        check_weighted(automatic=automatic, weighted=weights is not None, selection=selection)
     if arguments.one_of("loss", loss, get_args(Loss)) == "huber":
         without = partial(left_out, longest_gap=longest_gap(max_gap, seconds)) if beside_gaps else lambda _: incomplete
         samples = robust(
@@ -311,6 +311,7 @@ def fit_local_polynomials(
             value_in(plan_of_window, without, threads),
             length,
             omit=nan_policy == "omit",
+            weights=None if incomplete is None else incomplete.weights,
         )
     with arguments.reporter(progress, "local polynomials") as report:
         if automatic:

@@ -106,7 +106,6 @@ def left_out_of_own_times(
     axis: int,
     window_length: int | str,
     selection: str,
-    loss: str,
 ) -> LeftOut | None:
     """Return what is left out, as it was asked for, None where windows are to be whole; refuse what does not go with it."""
     if selection != "window":
@@ -122,7 +121,7 @@ def left_out_of_own_times(
             f"got {arguments.shown(max_gap)} with window_length='auto'; leave it out, or give a length"
         )
     if weights is not None or min_observations is not None:
-        incomplete.check_weighted(automatic=automatic, weighted=weights is not None, selection=selection, loss=loss)
+        incomplete.check_weighted(automatic=automatic, weighted=weights is not None, selection=selection)
     if min_observations is not None:
         most = None if isinstance(window_length, str) else window_length
         min_observations = incomplete.least_given(min_observations, most)
@@ -248,7 +247,7 @@ class _Fit:
         if how["loss"] == "huber":
             length = self.length
             rows = length if isinstance(length, int) else max(1, round(length / float(np.median(np.diff(times)))))
-            records = self._clipped(records, plan, rows)
+            records = self._clipped(records, plan, rows, weights)
         found = plan.estimate(records, step=step, workers=self.workers, progress=report).estimates
 
         def errors() -> npt.NDArray[np.float64]:
@@ -303,13 +302,16 @@ class _Fit:
         found = self.of(record, times, 1, None, None, least)
         return replace(found, sigma=found.sigma * np.sqrt(weight[0]))
 
-    def _clipped(self, records: npt.NDArray[np.number], plan: _core.WindowFit, rows: int) -> npt.NDArray[np.number]:
-        """Return records whose residuals are clipped, in windows of about so many rows."""
+    def _clipped(
+        self, records: npt.NDArray[np.number], plan: _core.WindowFit, rows: int, weights: Array | None
+    ) -> npt.NDArray[np.number]:
+        """Return records whose residuals are clipped, in windows of about so many rows; the plan knows the weights."""
 
-        def value(some: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-            return np.asarray(plan.estimate(some, step=1, workers=self.workers).estimates.derivatives[0])
+        def value(some: Array, _: Array | None) -> Array:
+            found = plan.estimate(np.ascontiguousarray(some), step=1, workers=self.workers)
+            return np.asarray(found.estimates.derivatives[0])
 
-        return with_clipped_residuals(records, value, rows, omit=False)
+        return with_clipped_residuals(records, value, rows, omit=False, weights=weights)
 
 
 def _is_enough(times: npt.NDArray[np.float64], length: float) -> bool:

@@ -227,7 +227,7 @@ class LocalPolynomialStream(SampleStream[StreamedDerivatives]):
             return self._given(self._stream.push(self._piece("y", y)))
         if weights is None or (not self._weighted and self.samples > 0):
             raise not_weighted_alike("samples", have=weights is not None)
-        check_weighted(automatic=False, weighted=True, selection=self._plan["selection"], loss="squares")
+        check_weighted(automatic=False, weighted=True, selection=self._plan["selection"])
         given = arguments.some_weights("weights", weights, (np.size(y),))
         samples = self._piece("y", y, given > 0)
         if not self._weighted:
