@@ -144,13 +144,11 @@ def test_curves_of_expansions_weigh_samples_by_their_noise() -> None:
         ),
         ({"weights": -np.ones(1000)}, r"weights must be finite and not negative; weights\[0\] is -1.0; give one over"),
         ({"weights": np.zeros(1000)}, "weights must leave something to use; got zeros alone"),
-        ({"loss": "huber"}, "weights need one angle .* got loss beside them; leave one of them out"),
-        ({"velocity": np.ones(1000)}, "got velocity beside them"),
-        ({"instrument": np.ones(1000)}, "got instrument beside them"),
+        ({"angle": None, "velocity": np.ones(1000)}, "weights need an angle: the noise of a velocity stays .* measure"),
     ],
 )
 def test_what_does_not_go_with_weights_is_said(beside: dict[str, Any], message: str) -> None:
     angle = np.sin(np.arange(1000) / 30)
-    call: dict[str, Any] = {"sample_rate": RATE, "weights": np.linspace(1, 2, 1000), **beside}
+    call: dict[str, Any] = {"sample_rate": RATE, "angle": angle, "weights": np.linspace(1, 2, 1000), **beside}
     with pytest.raises(ValueError, match=message):
-        tvident.identify(angle, angle, **call)
+        tvident.identify(torque=angle, **call)

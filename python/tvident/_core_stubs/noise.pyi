@@ -35,7 +35,10 @@ class Noise:
     def quantisation(self) -> float: ...
 
 def noise(
-    samples: npt.NDArray[np.number], quantisation: float | None = None, passed: PassedNoise | None = None
+    samples: npt.NDArray[np.number],
+    quantisation: float | None = None,
+    passed: PassedNoise | None = None,
+    weights: npt.NDArray[np.float64] | None = None,
 ) -> list[Noise]: ...
 def noise_coherence(
     angle: npt.NDArray[np.number],

@@ -186,11 +186,11 @@ def identify(
     mask : array_like of bool, shape (n,) or the angle's, optional
         True where a sample may be the centre of an equation.
     weights : array_like, shape (n,) or the angle's, optional
-        Weight of every sample, not negative: one over the variance of the noise of its angle and torque, relative to the others. Samples
-        of weight 0 are missing, whatever they hold, and a masked weight is 0. A factor of all weights changes nothing: noise and
-        residuals are those of a sample of mean weight. Where angle and torque have clocks of their own, they are those of the samples of
-        either, and say how large the noise of both is at that time; where `align` is to find an offset, those of the angle, and above 0.
-        See Notes.
+        Weight of every sample, not negative: one over the variance of the noise of its angle and torque, and of a velocity and an
+        acceleration beside the angle, relative to the others. Samples of weight 0 are missing, whatever they hold, and a masked weight is
+        0. A factor of all weights changes nothing: noise and residuals are those of a sample of mean weight. With Huber's loss residuals
+        are compared times the roots of weights. Where angle and torque have clocks of their own, they are those of the samples of either,
+        and say how large the noise of both is at that time; where `align` is to find an offset, those of the angle, and above 0. See Notes.
     loss : {"squares", "huber", "auto"}, optional
         ``"squares"``: least squares. ``"huber"``: residuals of the torque's samples beyond 2.5 standard deviations count linearly, so that
         spikes of few samples move parameters by little, however large they are (Huber 1981, modified residuals): the torque that the
@@ -251,7 +251,7 @@ def identify(
     ------
     ValueError
         If shapes differ, a window does not fit, `t` does not increase, nothing is unknown, the angle spans more than one and a half of
-        `period`, a name is unknown, there is no channel of the motion, or something needs the angle where there is none.
+        `period`, a name is unknown, there is no channel of the motion, or something, such as weights, needs the angle where there is none.
     TypeError
         If an array is complex or holds no numbers, or there is no sample period.
 

@@ -102,6 +102,7 @@ def motion_channels(
     has_spring: bool,
     quantisation: float | None,
     passed: Passed | None = None,
+    weights: npt.NDArray[np.float64] | None = None,
 ) -> MotionChannels:
     """Return one angle from what was measured of a motion.
 
@@ -117,6 +118,8 @@ def motion_channels(
         Step to which the angle was rounded.
     passed : Passed, optional
         What became of white noise where channels were resampled.
+    weights : ndarray of the same shape, optional
+        Of samples, of all channels: noise is that of a sample of weight one.
     """
     if list(given) == ["angle"]:
         return MotionChannels(given["angle"])
@@ -129,11 +132,11 @@ def motion_channels(
     shape = missing.shape[:-1]
     biases: dict[str, tuple[list[float], list[float]]] = {}
     doubts: list[tuple[int, str]] = []
-    sigmas = [_sigma(record, quantisation if source == "angle" else None, passed) for record in _records(first)]
+    sigmas = _sigmas(first, quantisation if source == "angle" else None, passed, weights)
     beside: list[list[tuple[int, float, _Numbers]]] = [[] for _ in sigmas]
     for name, values in others:
         order = DERIVATIVES[name] - integrations
-        noises = [_sigma(record, None, passed) for record in _records(values)]
+        noises = _sigmas(values, None, passed, weights)
         found = _judged_all(first, values, (order, period), (sigmas, noises))
         wrong = [record for record, one in enumerate(found) if one.words]
         if wrong:
@@ -227,11 +230,25 @@ def _sums(values: _Numbers, period: float) -> _Numbers:
     return np.concatenate([[0.0], np.cumsum(steps)]) * period
 
 
-def _sigma(record: _Numbers, quantisation: float | None, passed: Passed | None) -> float:
-    """Return the standard deviation of a channel's noise; 0 where nothing tells it."""
+def _sigmas(
+    channel: _Numbers,
+    quantisation: float | None,
+    passed: Passed | None,
+    weights: npt.NDArray[np.float64] | None,
+) -> list[float]:
+    """Return the standard deviation of a channel's noise in every record; 0 where nothing tells it."""
+    records = _records(channel)
+    own = [None] * len(records) if weights is None else _records(weights)
+    return [_sigma(record, quantisation, passed, one) for record, one in zip(records, own, strict=True)]
+
+
+def _sigma(
+    record: _Numbers, quantisation: float | None, passed: Passed | None, weights: npt.NDArray[np.float64] | None
+) -> float:
+    """Return that of one record."""
     try:
         noise = None if passed is None else passed.noise
-        sigma = _core.noise(np.ascontiguousarray(record), quantisation, noise)[0].sigma
+        sigma = _core.noise(np.ascontiguousarray(record), quantisation, noise, weights)[0].sigma
     except ValueError:  # the record is too short
         return 0.0
     return sigma if math.isfinite(sigma) else 0.0

@@ -32,7 +32,7 @@ from tvident._identify.signals import (
 )
 from tvident._identify.task import Task
 from tvident._identify.together import sampled
-from tvident._identify.weighted import check_alone, usable_channels, weights_of
+from tvident._identify.weighted import usable_channels, weights_of
 from tvident._units import (
     ROTARY,
     Axis,
@@ -104,7 +104,6 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         has_instrument=instruments is not None,
     )
     asked = loss_of(call["loss"], call["settings"])
-    _check_beside_weights(call, asked)
     weighted = weights_of(call["weights"], torques.shape) if clocks is None else weighted
     # What two clocks recorded was checked before; on the grid their gaps are no samples.
     channels, torques = usable_channels(channels, torques, weighted, call["nan_policy"] if clocks is None else "omit")
@@ -140,6 +139,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         has_spring=request.has_spring,
         quantisation=request.quantisation,
         passed=signals.passed.get(next(iter(measured))),
+        weights=None if signals.weights is None else signals.weights.values,
     )
     data = Data(
         angles=moving.angles,
@@ -175,13 +175,6 @@ def _on_clocks(request: Request, clocks: OwnClocks | None, earlier: Mapping[str,
         return request
     known = partial(clocks.known, earlier=earlier)
     return with_known(request, known, partial(known, over_gaps=False))
-
-
-def _check_beside_weights(call: Mapping[str, Any], loss: str) -> None:
-    """Refuse what does not go with weights, where there are any."""
-    if call["weights"] is not None:
-        beside = {name: call[name] for name in ("velocity", "acceleration", "instrument")}
-        check_alone({**beside, "loss": loss != "squares" or None})
 
 
 def _has_expansions(call: Mapping[str, Any]) -> bool:

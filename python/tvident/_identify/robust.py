@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any, Literal, TypeAlias, cast, get_args
 
 import numpy as np
+import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._huber import clip_residuals, has_heavy_tails
@@ -35,7 +36,8 @@ def with_clipped_torque(data: Data, loss: LossAsked, identified: Callable[[Data]
     ----------
     data : Data
     loss : {"squares", "huber", "auto"}
-        ``"auto"``: only of records in which many more residuals are far from zero than of normal noise.
+        ``"auto"``: only of records in which many more residuals are far from zero than of normal noise. Of samples with weights they are
+        compared times the roots of these, or of those around them, which makes their noise the same.
     identified : callable
         Identifies records.
     """
@@ -50,16 +52,25 @@ def with_clipped_torque(data: Data, loss: LossAsked, identified: Callable[[Data]
         for record in list(open_records):
             place = tuple(int(index) for index in np.unravel_index(record, data.batch))
             one = found[place] if place else found
-            predicted = predicted_at_samples(one)
-            if turn == 0 and loss == "auto" and not has_heavy_tails(recorded[record], predicted):
+            root = _root(data, place, one)
+            given, predicted = recorded[record] * root, predicted_at_samples(one) * root
+            if turn == 0 and loss == "auto" and not has_heavy_tails(given, predicted):
                 open_records.remove(record)
                 continue
-            clipped = clip_residuals(recorded[record], predicted)
+            clipped = clip_residuals(given, predicted)
             with np.errstate(invalid="ignore"):  # infinite samples stay as they are
-                moved = np.abs(clipped.values - torques[record])
-            torques[record], shares[record] = clipped.values, clipped.share
+                moved = np.abs(clipped.values - torques[record] * root)
+            torques[record], shares[record] = clipped.values / root, clipped.share
             if not np.nanmax(moved, initial=0.0) > _SETTLED * clipped.scale:
                 open_records.remove(record)
         if not open_records:
             break
     return replace(data, torques=torques.reshape(data.torques.shape), clipped=tuple(shares.tolist()))
+
+
+def _root(data: Data, place: tuple[int, ...], found: Identification) -> npt.NDArray[np.float64]:
+    """Return what residuals of the torque of one record are multiplied by to have the same noise."""
+    length = found.settings["window_length"]
+    if data.weights is None or not isinstance(length, int):
+        return np.ones(1)
+    return data.weights.part(place).roots(length)

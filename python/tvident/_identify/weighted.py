@@ -1,4 +1,4 @@
-"""Weights of samples: what they are one over the variance of, and what does not go with them."""
+"""Weights of samples: what they are one over the variance of."""
 
 from __future__ import annotations
 
@@ -69,6 +69,20 @@ class Weights:
             return None
         return np.ascontiguousarray(self.of_first if strong else self.values)
 
+    def roots(self, length: int) -> Array:
+        """Return what residuals of the samples of a record are multiplied by to have the same noise.
+
+        A residual has the noise of its sample, and that of the prediction: of the samples in a window of so many.
+        """
+        counted = self.values > 0
+        own = np.where(counted, 1 / np.where(counted, self.values, 1.0), 0.0)
+        sums, there = (np.concatenate([[0.0], np.cumsum(one)]) for one in (own, counted))
+        places, half = np.arange(own.size), length // 2
+        first, end = np.maximum(places - half, 0), np.minimum(places + half + 1, own.size)
+        around = (sums[end] - sums[first]) / np.maximum(there[end] - there[first], 1)
+        variance = np.maximum(own, around)
+        return np.asarray(1 / np.sqrt(np.where(variance > 0, variance, 1.0)))
+
     @property
     def spread(self) -> list[float]:
         """Variance of white noise over that of a sample of mean weight, of every record."""
@@ -78,16 +92,6 @@ class Weights:
     def part(self, place: Any) -> Weights:
         """Return those of some records."""
         return Weights(self.given[place])
-
-
-def check_alone(beside: Mapping[str, Any]) -> None:
-    """Refuse what does not go with weights: anything of some arguments that was given."""
-    for name, value in beside.items():
-        if value is not None:
-            raise ValueError(
-                f"weights need one angle and one torque, and least squares; got {name} beside them; leave one of them out: samples that "
-                "are not to count at all may be NaN"
-            )
 
 
 def weights_of(given: npt.ArrayLike | None, shape: tuple[int, ...]) -> Weights | None:
@@ -115,7 +119,19 @@ def usable_channels(
     weights: Weights | None,
     policy: str,
 ) -> tuple[dict[str, npt.NDArray[np.number]], npt.NDArray[np.number]]:
-    """Return channels of the motion and the torque, what has no weight missing, with a policy for values that are missing anyway."""
+    """Return channels of the motion and the torque, what has no weight missing, with a policy for values that are missing anyway.
+
+    Raises
+    ------
+    ValueError
+        If values are missing that must not be, or samples have weights and no angle was measured: noise that is integrated stays.
+    """
+    if weights is not None and "angle" not in channels:
+        source = next(iter(channels))
+        raise ValueError(
+            f"weights need an angle: the noise of a {source} stays in the angle that it is integrated to; got weights and no angle; "
+            "measure the angle, too, or leave the weights out"
+        )
     every = {**channels, "torque": torques}
     counted = None if weights is None else weights.given > 0
     for name, samples in every.items():

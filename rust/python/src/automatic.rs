@@ -64,7 +64,7 @@ pub(crate) fn estimate_automatically<'py>(
         watched(py, progress, |watch| {
             let mut flags = vec![0; count];
             for (index, record) in records.iter().enumerate() {
-                let found = noise(record, quantisation, instructions)?;
+                let found = noise(record, None, quantisation, instructions)?;
                 let coloured = coloured_or_low_passed_noise(record, found.sigma * found.sigma, instructions);
                 noises.push((coloured.variance().sqrt(), found.quantisation));
                 let prepared = AutomaticRecord::new(record, &coloured, highest, instructions)?;

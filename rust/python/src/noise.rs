@@ -27,22 +27,29 @@ pub(crate) struct Noise {
 }
 
 /// The noise of every record along the last axis, in the order of the leading axes. The quantisation is looked for where it is not given. Where records
-/// were resampled, as `passed` was, it is the noise that rows see: its density at low frequencies.
+/// were resampled, as `passed` was, it is the noise that rows see: its density at low frequencies. With weights, those of every sample, it is that
+/// of a sample of weight one.
 #[pyfunction]
-#[pyo3(signature = (samples, quantisation=None, passed=None))]
+#[pyo3(signature = (samples, quantisation=None, passed=None, weights=None))]
 pub(crate) fn noise(
     samples: &Bound<'_, PyUntypedArray>,
     quantisation: Option<f64>,
     passed: Option<&PassedNoise>,
+    weights: Option<&Bound<'_, PyUntypedArray>>,
 ) -> PyResult<Vec<Noise>> {
     let records = records(samples)?;
+    let weights = weights.map(values).transpose()?;
+    let weights = weights.as_deref();
+    if weights.is_some_and(|weights| records.iter().any(|record| record.len() != weights.len())) {
+        return Err(PyValueError::new_err("there must be as many weights as samples"));
+    }
     let instructions = Instructions::current();
     let mut noises = Vec::new();
     watched(samples.py(), None, |watch| {
         for (done, record) in records.iter().enumerate() {
             let found = match passed {
-                Some(passed) => noise_after(&passed.0, record, quantisation, instructions)?,
-                None => core_noise(record, quantisation, instructions)?,
+                Some(passed) => noise_after(&passed.0, record, weights, quantisation, instructions)?,
+                None => core_noise(record, weights, quantisation, instructions)?,
             };
             noises.push(Noise { sigma: found.sigma, quantisation: found.quantisation });
             if !watch(done, records.len()) {

@@ -147,7 +147,7 @@ fn route(task: &Task<'_>, options: &Options, watch: &mut Watch<'_>) -> Result<Ro
 }
 
 /// Makes deviations of residuals those of a sample of mean weight, whatever the unit of the weights.
-fn of_mean_weight(found: &mut Identification, weights: Option<&[f64]>) {
+pub(crate) fn of_mean_weight(found: &mut Identification, weights: Option<&[f64]>) {
     let counted = weights.unwrap_or_default().iter().filter(|weight| **weight > 0.0);
     let (sum, count) = counted.fold((0.0, 0_usize), |(sum, count), weight| (sum + weight, count + 1));
     if count > 0 {

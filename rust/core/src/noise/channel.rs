@@ -52,30 +52,14 @@ pub struct Noise {
     pub quantisation: f64,
 }
 
-/// Estimates the noise of a channel, and its quantisation where that is not given. NaN if no window is free of unusable samples.
+/// Estimates the noise of a channel, and its quantisation where that is not given. NaN if no window is free of unusable samples. Where the
+/// variance of every sample's noise is one over its weight, it is that of a sample of weight one.
 ///
 /// Costs `O(n)`, some 60 ns per sample, for up to 130 000 samples, and no more for longer records.
 ///
 /// # Errors
 /// If there are fewer than [`FEWEST_SAMPLES`].
-pub fn noise(record: &dyn Samples, quantisation: Option<f64>, instructions: Instructions) -> Result<Noise, Error> {
-    noise_of(record, None, quantisation, instructions)
-}
-
-/// How many samples there are.
-///
-/// # Errors
-/// If there are fewer than [`FEWEST_SAMPLES`].
-fn enough_samples(record: &dyn Samples) -> Result<usize, Error> {
-    let samples = record.len();
-    if samples < FEWEST_SAMPLES {
-        return Err(Error::RecordTooShort { samples, least: FEWEST_SAMPLES });
-    }
-    Ok(samples)
-}
-
-/// The same of a sample of weight one, where the variance of every sample's noise is one over its weight.
-fn noise_of(
+pub fn noise(
     record: &dyn Samples,
     weights: Option<&[f64]>,
     quantisation: Option<f64>,
@@ -88,6 +72,18 @@ fn noise_of(
     let least = rounding_variance(quantisation, weights).max((f64::EPSILON * largest(record)).powi(2));
     let sigma = if variance.is_nan() { f64::NAN } else { variance.max(least).sqrt() };
     Ok(Noise { sigma, quantisation })
+}
+
+/// How many samples there are.
+///
+/// # Errors
+/// If there are fewer than [`FEWEST_SAMPLES`].
+fn enough_samples(record: &dyn Samples) -> Result<usize, Error> {
+    let samples = record.len();
+    if samples < FEWEST_SAMPLES {
+        return Err(Error::RecordTooShort { samples, least: FEWEST_SAMPLES });
+    }
+    Ok(samples)
 }
 
 /// The variance of a channel's noise for the weights of equations: that of [`noise`], but at most the power in the
@@ -104,7 +100,7 @@ pub(crate) fn weighted_variance(
     quantisation: Option<f64>,
     instructions: Instructions,
 ) -> f64 {
-    let Ok(found) = noise_of(record, weights, quantisation, instructions) else { return 0.0 };
+    let Ok(found) = noise(record, weights, quantisation, instructions) else { return 0.0 };
     if found.sigma.is_nan() {
         return 0.0;
     }
@@ -146,11 +142,12 @@ pub fn variance_after(
 pub fn noise_after(
     passed: &PassedNoise,
     record: &dyn Samples,
+    weights: Option<&[f64]>,
     quantisation: Option<f64>,
     instructions: Instructions,
 ) -> Result<Noise, Error> {
     enough_samples(record)?;
-    let sigma = variance_after(Some(passed), record, None, quantisation, instructions).sqrt();
+    let sigma = variance_after(Some(passed), record, weights, quantisation, instructions).sqrt();
     Ok(Noise { sigma, quantisation: quantisation.unwrap_or_else(|| quantisation_step(record)) })
 }
 

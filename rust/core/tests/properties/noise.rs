@@ -15,7 +15,7 @@ fn wave(count: usize) -> impl Iterator<Item = f64> {
 }
 
 fn sigma(samples: &[f64]) -> f64 {
-    noise(&samples, None, Instructions::current()).expect("long enough").sigma
+    noise(&samples, None, None, Instructions::current()).expect("long enough").sigma
 }
 
 #[test]
@@ -37,12 +37,12 @@ fn a_long_record_is_looked_at_in_parts() {
 fn noise_is_never_below_quantisation_or_rounding() {
     let step = 0.01;
     let coarse: Vec<f64> = wave(4000).map(|value| (value / step).round() * step).collect();
-    let found = noise(&coarse.as_slice(), None, Instructions::current()).expect("long enough");
+    let found = noise(&coarse.as_slice(), None, None, Instructions::current()).expect("long enough");
     assert!((found.quantisation / step - 1.0).abs() < 1e-9);
     assert!(found.sigma >= step / 12_f64.sqrt() && found.sigma < 1.1 * step / 12_f64.sqrt());
     let resting = [7.0; 400];
     assert_eq!(
-        noise(&resting.as_slice(), Some(step), Instructions::current()).map(|found| found.sigma),
+        noise(&resting.as_slice(), None, Some(step), Instructions::current()).map(|found| found.sigma),
         Ok(step / 12_f64.sqrt())
     );
     assert!(sigma(&resting) > 0.0 && sigma(&resting) < 1e-14);
@@ -60,9 +60,9 @@ fn values_that_are_no_number_do_not_count() {
 #[test]
 fn a_record_of_less_than_a_window_is_refused() {
     let short = vec![0.0; FEWEST_SAMPLES - 1];
-    let message = noise(&short.as_slice(), None, Instructions::current()).expect_err("too short").to_string();
+    let message = noise(&short.as_slice(), None, None, Instructions::current()).expect_err("too short").to_string();
     assert!(message.contains("at least 25 samples"), "{message}");
-    assert!(noise(&[0.0; FEWEST_SAMPLES].as_slice(), None, Instructions::current()).is_ok());
+    assert!(noise(&[0.0; FEWEST_SAMPLES].as_slice(), None, None, Instructions::current()).is_ok());
 }
 
 /// First-order noise of correlation `ρ`, of variance one, over a signal.

@@ -12,6 +12,7 @@ use crate::identify::instrumented::constancy::tests;
 use crate::identify::instrumented::explained::explained;
 use crate::identify::instrumented::two_stage_rows::{TwoStageRows, WEAK_INSTRUMENT};
 use crate::identify::options::{Method, Options, StrongForm, Task, WeakForm};
+use crate::identify::route::of_mean_weight;
 use crate::identify::strong::rows::{differentiate, rows as strong_rows};
 use crate::identify::weak::form::with_record;
 use crate::inference::constancy::NO_CHANCE;
@@ -100,7 +101,11 @@ fn one(
         }
     }
     let (_, both, found) = best.ok_or(Error::NotDetermined)?;
-    Ok(identification(task, options, &both, found.as_ref()))
+    let (mut found, test) = identification(task, options, &both, found.as_ref());
+    if matches!(task.method, Method::Strong(_)) {
+        of_mean_weight(&mut found, task.weights);
+    }
+    Ok((found, test))
 }
 
 /// The test functions to try.
@@ -133,9 +138,10 @@ fn weak(
     let mut built = Vec::new();
     for motion in [&task.motion, explained] {
         let how = (options.delta, options.instructions);
-        let (rows, _) = with_record(motion, (task.mask, None, lag), how, (workers, &mut *watch), |record, watch| {
-            WeakRows::build(&record, function, options.delta, None, workers, watch)
-        })?;
+        let (rows, _) =
+            with_record(motion, (task.mask, task.weights, lag), how, (workers, &mut *watch), |record, watch| {
+                WeakRows::build(&record, function, options.delta, None, workers, watch)
+            })?;
         built.push(rows);
     }
     let reach = built[0].reach();
@@ -169,7 +175,7 @@ fn strong(
     for motion in [&task.motion, explained] {
         let lag = (task.lag.unwrap_or(0.0), form.filter_torque);
         let differentiated = differentiate(&plan, motion, lag, &mut stages)?;
-        built.push(strong_rows(&plan, motion, (task.mask, None), false, &differentiated));
+        built.push(strong_rows(&plan, motion, (task.mask, task.weights), false, &differentiated));
     }
     let mut rows = built.into_iter();
     let (recorded, explained) = (rows.next().unwrap_or_default(), rows.next().unwrap_or_default());
