@@ -346,6 +346,15 @@ def test_a_moving_base_drives_a_chain() -> None:
         assert abs(value - true) < 4 * error
 
 
+def test_of_a_torque_that_is_zero_nothing_is_explained() -> None:
+    simulated = chain([constant(12.0), constant(18.0)], 6000, seed=4, driven=(0,))
+    torque = simulated.torque * np.array([[1.0], [0.0]])
+    found = identify(simulated.angle, torque, structure=tvident.Chain(2, springs(2)), **OPTIONS)
+    predicted = found.held_back().predicted
+    assert predicted[0] > 98
+    assert np.isnan(predicted[1])
+
+
 def test_a_base_alone_is_enough_where_a_mass_is_known() -> None:
     simulated = chain([constant(12.0), constant(18.0)], 6000, seed=9, driven=(), base=True)
     structure = tvident.Chain(2, springs(2), base=simulated.base)

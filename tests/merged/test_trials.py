@@ -266,6 +266,16 @@ def test_what_cannot_be_done_is_refused_with_the_cure(options: dict[str, Any], m
         identify(trials.angle, trials.torque, **{**OPTIONS, **options})
 
 
+@pytest.mark.parametrize("more", [{}, {"dof_axis": 1, "structure": tvident.Chain(1, [("base", 0)])}])
+def test_a_trial_without_an_acceleration_is_refused(more: dict[str, Any]) -> None:
+    rig = tvident.simulate_torsional_rig(duration=1.0, seed=1)
+    angles, torques = ([one, one[:2]] for one in (rig.angle, rig.torque))
+    if more:
+        angles, torques = ([one[None] for one in each] for each in (angles, torques))
+    with pytest.raises(ValueError, match="trials must hold at least 3 samples each; got one of 2; leave it out"):
+        tvident.identify(angles, torques, sample_rate=1000, ensemble_axis=0, **more)
+
+
 def test_a_trial_of_which_nothing_is_left_is_named() -> None:
     """A dead channel counted as one of the trials, without a word."""
     rigs = [tvident.simulate_torsional_rig(duration=1.0, seed=seed) for seed in range(4)]

@@ -28,7 +28,8 @@ class HeldBackTorque:
     Parameters
     ----------
     predicted : ndarray, shape (equations,)
-        Percent of the variance of every torque, as averages over the test function; NaN where it was not measured or nothing can be known.
+        Percent of the variance of every torque, as averages over the test function; NaN where none was measured or acts, or
+        nothing can be known.
     simulated : ndarray, shape (masses,)
         Percent of the variance of every angle, simulated from the state before each held-back part, of equations that are linear or of one
         mass; empty for others, and where something cannot be known.
@@ -85,7 +86,10 @@ def held_back(merging: Merging) -> HeldBackTorque:
     with np.errstate(all="ignore"):
         shares = 100 * (1 - left / spread)
     length = max(part.found.window_length for part in merging.parts)
-    return HeldBackTorque(np.where(samples > 0, shares, np.nan), _simulated(merging, everything, length), parts)
+    # Where no torque acts there is nothing to explain.
+    return HeldBackTorque(
+        np.where((samples > 0) & (spread > 0), shares, np.nan), _simulated(merging, everything, length), parts
+    )
 
 
 @np.errstate(all="ignore")

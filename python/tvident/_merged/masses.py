@@ -19,7 +19,7 @@ from tvident._merged.merging import Merging, Part
 from tvident._merged.predicted import Equations, TrialArrays
 from tvident._merged.recorded import MergedRecorded
 from tvident._merged.result import MergedIdentification
-from tvident._merged.sampling import Sampling, variance_in_trials
+from tvident._merged.sampling import Sampling, check_lengths, variance_in_trials
 from tvident._merged.structure import Chain, matrices
 from tvident._merged.weighted import without_missing
 from tvident._units import scaled
@@ -169,10 +169,8 @@ def masses_of(
             "matrices, whose entries are given by tvident.Matrix"
         )
     if trials is None:
-        found = [_one_trial(angle, torque, axis, structure, base=getattr(structure, "base", None), mask=mask)]
-    else:
-        found = _several_trials((angle, torque), (trials, axis), structure, mask)
-    return found
+        return [_one_trial(angle, torque, axis, structure, base=getattr(structure, "base", None), mask=mask)]
+    return _several_trials((angle, torque), (trials, axis), structure, mask)
 
 
 def _one_trial(angle: Any, torque: Any, axis: int, structure: Any, *, base: Any, mask: Any) -> Masses:
@@ -184,6 +182,7 @@ def _one_trial(angle: Any, torque: Any, axis: int, structure: Any, *, base: Any,
             "them, take one record of a batch, or say which axis is that of trials: ensemble_axis="
         )
     count, samples = angles.shape
+    check_lengths([samples])
     each: list[Numbers] = list(angles)
     if isinstance(structure, Chain):
         if structure.masses != count:

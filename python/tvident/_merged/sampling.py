@@ -15,8 +15,18 @@ from tvident._merged.weighted import spread
 
 Numbers = npt.NDArray[np.number]
 
+_FEWEST = 3
+"""Samples of a trial: fewer have no second difference."""
+
 _LEAST = 25
 """Samples that tell noise, at least."""
+
+
+def check_lengths(samples: Sequence[int]) -> None:
+    """Refuse trials that are too short for an acceleration."""
+    short = next((count for count in samples if count < _FEWEST), None)
+    if short is not None:
+        raise ValueError(f"trials must hold at least {_FEWEST} samples each; got one of {short}; leave it out")
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._merged.sampling import Sampling
+from tvident._merged.sampling import Sampling, check_lengths
 from tvident._merged.weighted import of_core, without_missing
 from tvident._units import scaled
 
@@ -95,6 +95,7 @@ def trials_of(angle: Any, torque: Any, axis: int, *, phase: Any = None, mask: An
         If there is one record only, lengths of angle and torque differ, or a phase does not grow.
     """
     angles, torques = _records("angle", angle, axis), _records("torque", torque, axis)
+    check_lengths([one.size for one in angles])
     masks, phases = _masks(mask, angles), _optional("phase", phase, axis)
     for name, other in (("torque", torques), ("phase", phases), ("mask", masks)):
         if other is None:
