@@ -346,6 +346,17 @@ def test_a_moving_base_drives_a_chain() -> None:
         assert abs(value - true) < 4 * error
 
 
+def test_where_nothing_can_be_known_samples_are_invalid() -> None:
+    simulated = chain([constant(12.0), constant(18.0)], 6000, seed=4, driven=(0,))
+    found = identify(simulated.angle, simulated.torque, **OPTIONS)
+    assert set(found.kinds.values()) == {"unknown"}
+    nothing = tvident.Status.INVALID | tvident.Status.RANK_DEFICIENT
+    assert (found.status & nothing == nothing).all()
+    assert found.record_status & tvident.Status.RANK_DEFICIENT
+    # Elements with one reason are in one line.
+    assert sum("cannot be known: no force acts on mass 1" in line for line in found.advice) == 2
+
+
 def test_of_a_torque_that_is_zero_nothing_is_explained() -> None:
     simulated = chain([constant(12.0), constant(18.0)], 6000, seed=4, driven=(0,))
     torque = simulated.torque * np.array([[1.0], [0.0]])

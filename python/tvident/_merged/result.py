@@ -140,6 +140,9 @@ class MergedIdentification(Oscillating, Reported):
                 self.kinds[name] = "unknown"
                 self.constants.pop(name, None)
                 flags |= int(Status.RANK_DEFICIENT) if merging.unknowable.get(name) is None else 0
+        if "unknown" in self.kinds.values() and set(self.kinds.values()) <= {"known", "unknown"}:
+            self.status |= np.uint16(Status.INVALID | Status.RANK_DEFICIENT)
+            flags |= int(Status.RANK_DEFICIENT)
         self.record_status = Status(flags)
         self.settings = self._settings()
         self.scans = tuple(scan_of(part.found.scan, part.names) for part in merging.parts if part.found.scan.tried)

@@ -57,10 +57,17 @@ def words_of(result: Any, merging: Merging, scatter: Mapping[str, float]) -> Wor
                 "explains, and its standard errors are larger by as much; look at trial_spread"
             )
     advice += _without_equations(result.trial_spread)
+    advice += _unknown(result)
+    return Words(tuple(dict.fromkeys(reasons)), tuple(dict.fromkeys(advice)))
+
+
+def _unknown(result: Any) -> list[str]:
+    """Return which elements cannot be known, those together that have one reason."""
+    reasons: dict[str, list[str]] = {}
     for name, verdict in result.identifiable.items():
         if not verdict:
-            advice.append(f"{name} cannot be known: {verdict.reason}")
-    return Words(tuple(dict.fromkeys(reasons)), tuple(dict.fromkeys(advice)))
+            reasons.setdefault(verdict.reason, []).append(name)
+    return [f"{', '.join(names)} cannot be known: {reason}" for reason, names in reasons.items()]
 
 
 def _slow(merging: Merging) -> list[str]:
