@@ -41,6 +41,7 @@ def words_of(result: Any, merging: Merging, scatter: Mapping[str, float]) -> Wor
             reasons += one.words.reasons
             advice += one.words.advice
         else:
+            advice += _unfollowed(result) if one.changes_in_common else []
             advice += [words for flag, words in _DOUBTS.items() if one.record_status & flag]
         advice += [_SILENT] if one.misfit > 1 else []
         advice += _channels_of(part, merging.masses, sampling.period)
@@ -59,6 +60,14 @@ def words_of(result: Any, merging: Merging, scatter: Mapping[str, float]) -> Wor
     advice += _without_equations(result.trial_spread)
     advice += _unknown(result)
     return Words(tuple(dict.fromkeys(reasons)), tuple(dict.fromkeys(advice)))
+
+
+def _unfollowed(result: Any) -> list[str]:
+    """Return what to do where windows leave what all trials have in common."""
+    names = [name for name, kind in result.kinds.items() if kind == "windowed"]
+    what = f"{' or '.join(names)} changes faster than they follow, or something acts in every trial then"
+    cure = f"functions of time have no windows: {names[0]}=tvident.Expansion('bspline')"
+    return [f"windows leave what is the same in all trials at one time: {what}; {cure}"]
 
 
 def _unknown(result: Any) -> list[str]:

@@ -8,6 +8,7 @@ use std::f64::consts::SQRT_2;
 use crate::error::Error;
 use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::MergedSession;
+use crate::identify::weak::shown_noise::MORE;
 use crate::regression::residuals::residuals;
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 
@@ -24,13 +25,7 @@ impl MergedSession<'_, '_, '_> {
         if self.options.window_length.is_some() || self.options.regression_window.is_some() {
             return Ok(fitted);
         }
-        while fitted.has_shortest_windows() && fitted.error > FOLLOWS {
-            let rows = &self.all.rows;
-            let problem = fitted.model.problem(rows, &rows.rhs, 1.0, None);
-            let (left, _) = residuals(&problem, &fitted.fit, &mut self.stages)?;
-            if self.left_in_common(&fitted, &left) < IN_COMMON {
-                break;
-            }
+        while fitted.has_shortest_windows() && fitted.error > FOLLOWS && self.is_in_common(&fitted)? {
             let function = self.all.function;
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a half-width is positive")]
             let half_width = (function.half_width() as f64 / SQRT_2).round() as usize;
@@ -52,5 +47,21 @@ impl MergedSession<'_, '_, '_> {
             (fitted, self.at_end) = (again, self.all.function.half_width() == LEAST_HALF_WIDTH);
         }
         Ok(fitted)
+    }
+
+    /// Whether windows leave far more than noise, and that is the same in all trials at one time, along what they follow.
+    pub(crate) fn changes_in_common(&mut self, fitted: &MergedFit) -> Result<bool, Error> {
+        Ok(fitted.error > MORE && self.is_in_common(fitted)?)
+    }
+
+    /// Whether what windows leave is the same in all trials at one time.
+    fn is_in_common(&mut self, fitted: &MergedFit) -> Result<bool, Error> {
+        if fitted.model.windowed.is_empty() || self.merged.trials.len() < 2 {
+            return Ok(false);
+        }
+        let rows = &self.all.rows;
+        let problem = fitted.model.problem(rows, &rows.rhs, 1.0, None);
+        let (left, _) = residuals(&problem, &fitted.fit, &mut self.stages)?;
+        Ok(self.left_in_common(fitted, &left) >= IN_COMMON)
     }
 }

@@ -41,6 +41,8 @@ pub struct MergedFound {
     /// How many times its noise is left of an equation without a torque, which any multiple of its parameters satisfies, at most; 1 where all
     /// are explained.
     pub misfit: f64,
+    /// Whether windows leave what all trials have in common at one time: something changes faster than they follow.
+    pub changes_in_common: bool,
     /// Variances of the noise of every angle and every torque.
     pub noise: (Vec<f64>, Vec<f64>),
     /// How many times as strong the noise of every angle is at the lowest frequencies as at the highest, where those variances are read.

@@ -99,8 +99,8 @@ impl MergedSession<'_, '_, '_> {
         found.record_status |= found.scan.status_but_for(&found.constants_found(), 0.0);
         let SuspectedChannels { each, beside } = self.suspected_channels(fitted, &noise, &correlated)?;
         let SuspectedTerms { each: terms, beside: beside_terms } = self.suspected_terms(fitted, &noise, &correlated)?;
-        let is_other = |beside: Fit| self.are_others(fitted, &beside, &errors, &covariance);
-        let is_wrong = self.is_contradicted(fitted) || [beside, beside_terms].into_iter().flatten().any(is_other);
+        found.changes_in_common = self.changes_in_common(fitted)?;
+        let is_wrong = self.is_wrong(fitted, &found, [beside, beside_terms], (&errors, &covariance));
         status.iter_mut().filter(|_| is_wrong).for_each(|status| *status |= Status::NOISE_MODEL.bits());
         (found.covariance, found.pairs) = (covariance, pairs);
         (found.late, found.lacking) = each.into_iter().partition(|(_, suspect)| suspect.missing == Missing::Lag);
@@ -246,6 +246,20 @@ impl MergedSession<'_, '_, '_> {
         AtRows { status, errors, covariances, pairs }
     }
 
+    /// Whether numbers are wrong by more than their errors say: windows do not follow what changes, a constant changes, or what is missing in the equations moves
+    /// them.
+    fn is_wrong(
+        &self,
+        fitted: &MergedFit,
+        found: &MergedFound,
+        beside: [Option<Fit>; 2],
+        (errors, covariance): (&[Vec<f64>], &[f64]),
+    ) -> bool {
+        let is_unfollowed = found.changes_in_common && fitted.error > NOISE_MODEL_FAILS;
+        let is_other = |beside: Fit| self.are_others(fitted, &beside, errors, covariance);
+        is_unfollowed || self.is_contradicted(fitted) || beside.into_iter().flatten().any(is_other)
+    }
+
     /// Whether a coefficient that stays constant differs between parts of the record, beside equations that leave more than noise explains.
     fn is_contradicted(&self, fitted: &MergedFit) -> bool {
         let mut of_constants = fitted.tests.iter().filter(|(one, _)| fitted.model.constant.contains(one));
@@ -330,6 +344,7 @@ impl MergedSession<'_, '_, '_> {
             lengths: Vec::new(),
             prediction_error: 1.0,
             misfit: 1.0,
+            changes_in_common: false,
             noise: (self.noise[0].clone(), self.noise[1].clone()),
             colours: self.colours.iter().map(|noise| (noise.density(0.0) / noise.density(PI)).max(1.0)).collect(),
             elements: self.merged.unknowns().into_iter().map(unknown).collect(),
