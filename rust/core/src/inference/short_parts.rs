@@ -44,7 +44,9 @@ const NEARLY_ALL: f64 = 0.9;
 pub(crate) struct Swinging {
     pub(crate) constant: usize,
     pub(crate) test: Test,
-    /// Rows of the longest parts that hardly hide by how much, where longer ones do.
+    /// Rows of the longest parts that hardly hide by how much.
+    pub(crate) length: usize,
+    /// The same where longer ones hide it.
     pub(crate) longest: Option<usize>,
 }
 
@@ -71,7 +73,7 @@ pub(crate) fn swinging(
             let each = estimates.iter().flatten();
             let each: Vec<_> = each.map(|(values, variances)| (values[constant], variances[constant])).collect();
             if let Some(test) = compare(&each).filter(|_| most_differ(&each)) {
-                differing.push(Swinging { constant, test, longest: (place > 0).then_some(length) });
+                differing.push(Swinging { constant, test, length, longest: (place > 0).then_some(length) });
             }
         }
     }
@@ -85,6 +87,11 @@ pub(crate) fn swinging(
     let mut found: Vec<(f64, Swinging)> = constants.into_iter().filter_map(of_constant).collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     Ok(found.into_iter().map(|(_, one)| one).collect())
+}
+
+/// The length of the shortest parts of so many rows.
+pub(crate) fn shortest(rows: usize, span: usize) -> usize {
+    lengths(rows, WINDOWS * span).last().map_or(rows, |(length, _)| *length)
 }
 
 /// Lengths of parts of so many rows, the longest first, and how many of each are compared.

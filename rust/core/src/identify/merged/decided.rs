@@ -61,9 +61,14 @@ impl MergedFit {
         let Some(place) = place.filter(|_| !self.tests.iter().any(is_said)) else { return };
         let test = Test::of_prediction(self.error / followed.error, independent, &followed.fit.values(place));
         if test.probability < constancy::NO_CHANCE {
-            self.contradicted = true;
-            self.tests.retain(|(tested, _)| *tested != one);
-            self.tests.push((one, test));
+            self.contradict_by(one, test);
         }
+    }
+
+    /// Contradicts a constant by a test.
+    pub(crate) fn contradict_by(&mut self, one: usize, test: Test) {
+        self.contradicted = true;
+        self.tests.retain(|(tested, _)| *tested != one);
+        self.tests.push((one, test));
     }
 }

@@ -4,6 +4,7 @@ use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::identify::kinds::Kind;
 use crate::identify::merged::decided::MergedFit;
+use crate::identify::merged::freed::{Freed, Sought, different};
 use crate::identify::merged::session::MergedSession;
 use crate::identify::merged::shown::NoiseOfRows;
 use crate::identify::weak::shown_noise::MORE;
@@ -11,7 +12,6 @@ use crate::inference::constancy::{self, Test};
 use crate::inference::cross_validation::{Validated, best, validate};
 use crate::inference::jumps::jump::Jump;
 use crate::inference::part_constants::{NoiseFrom, TestNoise};
-use crate::inference::short_parts::{LEFT_OF_SWINGS, MORE_THAN_NOISE, swinging};
 use crate::regression::fit::Fit;
 use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
@@ -21,43 +21,9 @@ use crate::regression::window_length::Scale;
 
 /// So many of the longest windows that stretches of a long record hold are tried again on all of it, where one of them is best.
 const OVERLAP: usize = 2;
-/// What was constant is windowed from here on only if rows are predicted at least so much better.
-const BETTER: f64 = 0.98;
-/// What no test shows to change is windowed only if rows are predicted so much better: it is what the equations lack.
-const LACKING: f64 = 0.5;
-/// Where equations leave more than the noise of the channels and that may be noise, what windows follow must pay by more than chance.
-pub(crate) const SHOWN: f64 = 0.8;
-/// So many times the noise of the channels is hardly noise.
-const NO_NOISE: f64 = 50.0;
 
 /// Rounds of looking for jumps and fitting again with windows that end there.
 const JUMP_ROUNDS: usize = 4;
-/// Constants that differ between parts of the record which are set free for a trial, those that differ most.
-const TRIED: usize = 3;
-
-/// Mean squared error of predicting a row, over the noise's, up to which nothing else changes.
-const WELL: f64 = 1.3;
-
-/// Why a constant is tried in windows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Sought {
-    /// It differs between parts of the record.
-    Differing,
-    /// It differs between short parts all over it alone.
-    Swinging,
-    /// Constants leave so much that no part can differ by more.
-    Hidden,
-}
-
-/// The elements' values and the equations' misfits that weights are made of.
-type Guess = (Vec<f64>, Vec<f64>);
-
-/// A constant that windows follow, and what weights are made of beside it.
-struct Freed {
-    one: usize,
-    found: MergedFit,
-    guess: Guess,
-}
 
 impl MergedSession<'_, '_, '_> {
     /// Fits a model in windows of the length that predicts best; `None` where the rows do not determine what is constant.
@@ -182,18 +148,24 @@ impl MergedSession<'_, '_, '_> {
             let found = self.tests(&fitted, NoiseFrom::Channels)?;
             let mut tried = different(&found);
             fitted.take_tests(found);
-            // What constants leave may be so much that no part of the record differs by more, though one of them changes.
-            let mut sought = if tried.is_empty() && fitted.error > MORE { Sought::Hidden } else { Sought::Differing };
-            if tried.is_empty() && (MORE_THAN_NOISE..=MORE).contains(&fitted.error) {
-                (sought, tried) = (Sought::Swinging, self.swinging(&fitted)?);
+            let (mut sought, mut swings) = (Sought::Differing, Vec::new());
+            if tried.is_empty() && fitted.error > MORE {
+                // What constants leave may be so much that no part of the record differs by more, though one of them changes.
+                sought = Sought::Hidden;
+            } else if tried.is_empty() {
+                (sought, swings) = self.swings(&fitted)?;
+                tried = swings.iter().map(|one| one.element).collect();
             }
             let hidden = sought == Sought::Hidden;
             let before = (self.parameters.clone(), self.misfits.clone());
             let Some(Freed { one, found, guess }) = self.freed(&fitted, tried, sought)? else {
                 (self.parameters, self.misfits) = before;
                 self.fill();
-                let told = self.told_by_what_is_left(fitted)?;
+                let mut told = self.told_by_what_is_left(fitted)?;
                 let Some(again) = self.freed_together(&told)? else {
+                    for (one, _) in self.told_swings(&told, swings)? {
+                        told.contradict_by(one.element, one.test);
+                    }
                     return self.held_by_torques(told).map(Some);
                 };
                 fitted = MergedFit { tests: told.tests, ..again };
@@ -207,6 +179,11 @@ impl MergedSession<'_, '_, '_> {
                 let usable = self.all.rows.usable.iter().filter(|usable| **usable).count();
                 let inflation = self.noise_of_rows(&fitted)?.expected.variance_inflation;
                 fitted.contradict(one, &found, usable as f64 / inflation);
+                for (swing, _) in
+                    self.told_swings(&fitted, swings)?.into_iter().filter(|(swing, _)| swing.element == one)
+                {
+                    fitted.contradict_by(one, swing.test);
+                }
                 return self.held_by_torques(fitted).map(Some);
             }
             // Windows were compared with weights of parameters that were wrong while this one was held constant.
@@ -227,85 +204,8 @@ impl MergedSession<'_, '_, '_> {
         }
     }
 
-    /// The constant that explains most where windows follow it, if that is worth it: of those that differ between parts of the record, or of all
-    /// where no part can.
-    fn freed(&mut self, fitted: &MergedFit, mut tried: Vec<usize>, sought: Sought) -> Result<Option<Freed>, Error> {
-        let before = (self.parameters.clone(), self.misfits.clone());
-        let hidden = sought == Sought::Hidden;
-        if hidden {
-            tried = self.suspects(&fitted.model)?;
-        }
-        tried.truncate(TRIED);
-        let may_be_noise = (MORE..NO_NOISE).contains(&fitted.error);
-        let most = match (sought, may_be_noise) {
-            (Sought::Swinging, _) => (1.0 + LEFT_OF_SWINGS * (fitted.error - 1.0)) / fitted.error,
-            (Sought::Hidden, _) if fitted.error > NOISE_MODEL_FAILS => LACKING,
-            (Sought::Hidden, _) | (Sought::Differing, true) => SHOWN,
-            (Sought::Differing, false) => BETTER,
-        };
-        // Where nothing but the noise of the channels is left, or what no noise is, what a test says is enough.
-        let enough = fitted.model.windowed.is_empty() && sought == Sought::Differing && !may_be_noise;
-        let mut best: Option<Freed> = None;
-        for one in tried {
-            (self.parameters, self.misfits) = before.clone();
-            let freer = without(&fitted.model, one);
-            if hidden {
-                self.begin_with(&freer)?;
-            }
-            let Some(found) = self.fitted(&freer)? else { continue };
-            let is_better = enough && self.is_open(one) || found.error < most * fitted.error;
-            if is_better && best.as_ref().is_none_or(|best| found.error < best.found.error) {
-                best = Some(Freed { one, found, guess: (self.parameters.clone(), self.misfits.clone()) });
-            }
-        }
-        Ok(best)
-    }
-
-    /// A fit in which windows follow all constants at once that differ even beside what is left, if that explains far more: of what changes at the
-    /// same time none alone is worth its windows, and a jump is seen only beside all that jump.
-    fn freed_together(&mut self, told: &MergedFit) -> Result<Option<MergedFit>, Error> {
-        let may_be_freed = |one: usize| told.model.constant.contains(&one) && self.is_open(one);
-        let differ: Vec<_> = different(&told.tests).into_iter().filter(|&one| may_be_freed(one)).collect();
-        if told.error <= MORE || differ.is_empty() {
-            return Ok(None);
-        }
-        let before = (self.parameters.clone(), self.misfits.clone(), self.jumps.clone());
-        let freer = differ.into_iter().fold(told.model.clone(), |model, one| without(&model, one));
-        if let Some(free) = self.fitted(&freer)? {
-            let free = self.beside_jumps(free)?;
-            if free.error < SHOWN * told.error {
-                return Ok(Some(free));
-            }
-        }
-        (self.parameters, self.misfits, self.jumps) = before;
-        self.fill();
-        Ok(None)
-    }
-
-    /// A fit beside which an element was set free, or one with another in its place that explains far more: parts hardly differ in what swings
-    /// many times in each, and more in what follows a little of it.
-    fn or_another(&mut self, before: &MergedFit, free: MergedFit) -> Result<MergedFit, Error> {
-        if free.error <= WELL || free.error > MORE {
-            return Ok(free);
-        }
-        let guess = (self.parameters.clone(), self.misfits.clone());
-        let most = self.suspects(&before.model)?.into_iter().next();
-        if let Some(one) = most.filter(|&one| self.is_open(one) && !free.model.windowed.contains(&one)) {
-            (self.parameters, self.misfits) = guess.clone();
-            self.fill();
-            if let Some(found) =
-                self.fitted(&without(&before.model, one))?.filter(|found| found.error < SHOWN * free.error)
-            {
-                return Ok(found);
-            }
-        }
-        (self.parameters, self.misfits) = guess;
-        self.fill();
-        Ok(free)
-    }
-
     /// A fit whose windows end at jumps, if there are any and it predicts better so: what windows cannot follow makes others seem to vary.
-    fn beside_jumps(&mut self, mut fitted: MergedFit) -> Result<MergedFit, Error> {
+    pub(crate) fn beside_jumps(&mut self, mut fitted: MergedFit) -> Result<MergedFit, Error> {
         let found = self.find_jumps(&fitted)?;
         if samples(&found) != samples(&self.jumps) {
             let before = (self.jumps.clone(), self.parameters.clone(), self.misfits.clone());
@@ -322,26 +222,13 @@ impl MergedSession<'_, '_, '_> {
         Ok(fitted)
     }
 
-    /// Constants, those first that leave least where short windows follow them.
-    fn suspects(&mut self, model: &Model) -> Result<Vec<usize>, Error> {
-        let mut left = Vec::new();
-        for one in model.constant.clone() {
-            if !self.is_tried(one) {
-                continue;
-            }
-            left.extend(self.begin_with(&without(model, one))?.map(|left| (one, left)));
-        }
-        left.sort_by(|a, b| a.1.total_cmp(&b.1));
-        Ok(left.into_iter().map(|(one, _)| one).collect())
-    }
-
     /// Whether the record decides what kind an element is of.
-    fn is_open(&self, element: usize) -> bool {
+    pub(crate) fn is_open(&self, element: usize) -> bool {
         self.merged.elements[element].kind == Kind::Automatic
     }
 
     /// Whether a constant is asked whether it changes: not if it stands for zeros of angles in equations without a torque, and was asked for as constant.
-    fn is_tried(&self, element: usize) -> bool {
+    pub(crate) fn is_tried(&self, element: usize) -> bool {
         self.is_open(element) || !self.takes_all(element)
     }
 
@@ -377,37 +264,8 @@ impl MergedSession<'_, '_, '_> {
         let of_constants = fitted.model.constant.iter().copied().zip(tests);
         Ok(of_constants.filter(|(one, _)| self.is_tried(*one)).filter_map(|(one, test)| Some((one, test?))).collect())
     }
-
-    /// Constants of the motion that differ between short parts of the records, those first that differ most.
-    fn swinging(&mut self, fitted: &MergedFit) -> Result<Vec<usize>, Error> {
-        let NoiseOfRows { covariance, expected, inflation, from } = NoiseOfRows::of_channels(fitted);
-        let rows = &self.all.rows;
-        let problem = fitted.model.problem(rows, &rows.rhs, 1.0, Some(&fitted.correlated));
-        let noise =
-            TestNoise { expected, covariance: &covariance, inflation, from, equations: self.merged.equations() };
-        let constants = &fitted.model.constant;
-        let may = |one: &usize| self.merged.elements[*one].is_of_motion() && self.is_tried(*one);
-        let may: Vec<bool> = constants.iter().map(may).collect();
-        let found = swinging(&problem, (&fitted.fit, &may), noise, self.options.instructions, &mut self.stages)?;
-        Ok(found.into_iter().map(|one| constants[one.constant]).collect())
-    }
-}
-
-/// Constants that differ between parts of the record, those first that differ most.
-fn different(found: &[(usize, Test)]) -> Vec<usize> {
-    let mut found: Vec<_> = found.iter().filter(|(_, test)| test.probability < constancy::NO_CHANCE).collect();
-    found.sort_by(|a, b| b.1.excess().total_cmp(&a.1.excess()));
-    found.into_iter().map(|(one, _)| *one).collect()
 }
 
 fn samples(jumps: &[Jump]) -> Vec<usize> {
     jumps.iter().map(|jump| jump.sample).collect()
-}
-
-/// A model with one constant less, which is windowed.
-fn without(model: &Model, one: usize) -> Model {
-    let mut freer = model.clone();
-    freer.constant.retain(|&other| other != one);
-    freer.windowed.push(one);
-    freer
 }

@@ -14,6 +14,9 @@ use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::residuals::residuals;
 use crate::regression::row_covariance::RowCovariance;
 
+/// Where equations leave more than the noise of the channels and that may be noise, what windows follow must pay by more than chance.
+pub(crate) const SHOWN: f64 = 0.8;
+
 /// The noise that errors and tests of constants rest on.
 pub(crate) struct NoiseOfRows {
     pub(crate) covariance: RowCovariance,

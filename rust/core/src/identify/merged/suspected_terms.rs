@@ -7,9 +7,8 @@ use crate::equation::rows::Regressor;
 use crate::equation::terms::BuiltInTerm;
 use crate::error::Error;
 use crate::identify::merged::decided::MergedFit;
-use crate::identify::merged::fitted::SHOWN;
 use crate::identify::merged::session::MergedSession;
-use crate::identify::merged::shown::NoiseOfRows;
+use crate::identify::merged::shown::{NoiseOfRows, SHOWN};
 use crate::identify::merged::system::Multiplied;
 use crate::identify::weak::friction::{Sliding, expected_sign};
 use crate::identify::weak::shown_noise::MORE;
@@ -38,10 +37,10 @@ pub(crate) struct SuspectedTerms {
 }
 
 /// A term that may be missing in an equation, and its column among the regressors.
-struct PossibleTerm {
+pub(crate) struct PossibleTerm {
     equation: usize,
     missing: Missing,
-    column: usize,
+    pub(crate) column: usize,
 }
 
 impl MergedSession<'_, '_, '_> {
@@ -95,7 +94,7 @@ impl MergedSession<'_, '_, '_> {
     }
 
     /// Adds the columns of what may be missing, and says what they are.
-    fn candidates(&mut self) -> Result<Vec<PossibleTerm>, Error> {
+    pub(crate) fn candidates(&mut self) -> Result<Vec<PossibleTerm>, Error> {
         let mut candidates = Vec::new();
         if self.merged.trials.iter().any(|trial| trial.position.is_some()) {
             return Ok(candidates);
@@ -190,6 +189,6 @@ fn drives(suspect: &Suspect) -> bool {
     suspect.missing.name() == NAMES[0] && suspect.value < 0.0
 }
 
-fn sum_of_squares((left, usable): &(Vec<f64>, Vec<bool>)) -> f64 {
+pub(crate) fn sum_of_squares((left, usable): &(Vec<f64>, Vec<bool>)) -> f64 {
     left.iter().zip(usable).filter(|(_, usable)| **usable).map(|(left, _)| left * left).sum()
 }
