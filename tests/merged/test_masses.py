@@ -357,6 +357,23 @@ def test_where_nothing_can_be_known_samples_are_invalid() -> None:
     assert sum("cannot be known: no force acts on mass 1" in line for line in found.advice) == 2
 
 
+@pytest.mark.parametrize(
+    "known",
+    [
+        {"stiffness": [np.full(6000, 12.0), "auto"], "structure": tvident.Chain(2, springs(2))},
+        {"stiffness": {"stiffness_0_1": np.full(6000, 12.0)}, "structure": tvident.Chain(2, springs(2))},
+        {"stiffness": tvident.Matrix("full", entries={(0, 1): np.full(6000, 12.0)})},  # type: ignore[dict-item]
+        {"stiffness": [[np.full(6000, 12.0), 0.0], [0.0, "auto"]]},
+    ],
+)
+def test_what_is_known_at_every_sample_is_refused_with_the_cure(known: dict[str, Any]) -> None:
+    simulated = chain([constant(12.0), constant(18.0)], 6000, seed=4)
+    with pytest.raises(
+        ValueError, match=r"stiffness_\w+ must be a number where it is known.* take its part of the torque off"
+    ):
+        identify(simulated.angle, simulated.torque, **known, **OPTIONS)
+
+
 def test_of_a_torque_that_is_zero_nothing_is_explained() -> None:
     simulated = chain([constant(12.0), constant(18.0)], 6000, seed=4, driven=(0,))
     torque = simulated.torque * np.array([[1.0], [0.0]])

@@ -107,12 +107,13 @@ def kind_or_number(name: str, value: object) -> Kind | float | Expansion:
     """
     if isinstance(value, Expansion):
         return value
-    found = parameter(name, "auto" if value is None else value, ())
-    if isinstance(found, np.ndarray):
-        raise ValueError(  # noqa: TRY004 - arrays are known parameters elsewhere
-            f"{name} must be a number where it is known, beside ensemble_axis= and dof_axis=; got an array, which is not supported there "
-            "yet; take its part of the torque off the torque"
+    if not isinstance(value, str) and hasattr(value, "__len__"):
+        raise ValueError(
+            f"{name} must be a number where it is known, beside ensemble_axis= and dof_axis=; got {arguments.shown(value)}; what is known "
+            "at every sample is not supported there yet: take its part of the torque off the torque"
         )
+    found = parameter(name, "auto" if value is None else value, ())
+    assert not isinstance(found, np.ndarray)  # noqa: S101 - it has no length
     return found
 
 

@@ -256,7 +256,7 @@ def matrices(given: Mapping[str, Any], masses: int) -> list[Element]:
         value = given.get(of)
         if isinstance(value, Matrix):
             one = value
-        elif value is None or isinstance(value, str) or np.ndim(value) == 0:
+        elif value is None or _is_single(value):
             scalar: Any = "auto" if value is None else value
             one = Matrix("full" if isinstance(scalar, str | Expansion) else "diagonal", scalar)
         else:
@@ -267,7 +267,7 @@ def matrices(given: Mapping[str, Any], masses: int) -> list[Element]:
                     "give a kind, a number or an Expansion for every entry"
                 )
             each = {
-                (i, j): one if isinstance(one, str | Expansion) else float(one)
+                (i, j): float(one) if _is_single(one) and not isinstance(one, str | Expansion) else one
                 for i, row in enumerate(rows)
                 for j, one in enumerate(row)
             }
@@ -303,13 +303,20 @@ def _links(name: str, links: Sequence[Link], masses: int) -> tuple[Link, ...]:
     return tuple(found)
 
 
+def _is_single(given: Any) -> bool:
+    """Return whether something is one kind, number or Expansion, or nothing, rather than several."""
+    if isinstance(given, np.ndarray):
+        return given.ndim == 0
+    return isinstance(given, str) or not isinstance(given, Sequence | Mapping)
+
+
 def _each(of: str, given: Any, members: Sequence[tuple[Any, str]]) -> list[Any]:
     """Return what was given of every element of a kind."""
     if isinstance(given, Matrix):
         raise ValueError(  # noqa: TRY004 - it goes with another structure
             f"{of} must be given by elements beside a Chain; got a Matrix; leave structure= out, or give one kind"
         )
-    if given is None or isinstance(given, str) or (np.ndim(given) == 0 and not isinstance(given, Mapping)):
+    if _is_single(given):
         return ["auto" if given is None else given] * len(members)
     if isinstance(given, Mapping):
         unmentioned(of, given, [key for member in members for key in member])
