@@ -26,7 +26,8 @@ _DOUBTS = {
 
 _SILENT = (
     "the equation of a mass on which no force acts leaves more than noise explains, and where no force holds them parameters are drawn "
-    "towards zero: do not trust the numbers; look for a spring that changes ('windowed'), or let a force act on every mass"
+    "towards zero: do not trust the numbers; look for a spring that changes ('windowed', or an Expansion), or let a force that is measured "
+    "act on every mass"
 )
 
 
