@@ -73,3 +73,16 @@ def test_a_spring_that_changes_is_followed_where_a_base_moves_alone(
     if changes in {stepping, falling}:
         assert len(found.jumps) == 1
         assert abs(found.jumps[0] - (3.7 if changes is stepping else 4.6)) < 0.05
+
+
+@pytest.mark.parametrize("seed", [44, *long(45)])
+def test_an_expansion_knows_its_errors_where_a_base_moves_alone(seed: int) -> None:
+    # The noise of a torque that is zero counted as 1 N m: standard errors of 14 %, and inertia a third too small.
+    simulated = chain([swinging, held], 8000, seed=seed, driven=(), base=True)
+    found = identified(simulated, inertia={1: 0.03}, stiffness=[tvident.Expansion("bspline"), "constant"])
+    error = found.elements["stiffness_base_0"] - simulated.stiffness[0]
+    assert np.sqrt(np.mean(error**2)) < 1e-3 * 12
+    assert np.median(found.stderr["stiffness_base_0"]) < 1e-3 * 12
+    assert np.mean(np.abs(error) < 2.5 * found.stderr["stiffness_base_0"]) > 0.8
+    value, stderr = found.constants["inertia_0"]
+    assert abs(value - 0.02) < 4 * stderr < 1e-3

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._expansion.covariance import Whitening
-from tvident._expansion.rows import Curves, ExpandedRecord, ExpandedUnknown
+from tvident._expansion.rows import Curves, ExpandedRecord, ExpandedUnknown, parts
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -24,11 +24,29 @@ _AT_ONCE, KEPT = 1 << 21, 1 << 22
 """Numbers of the whitened columns that are in memory at once, and of those that all records keep: 16 and 32 MiB."""
 
 
-def with_least_noise(noise: Noise, records: Sequence[ExpandedRecord]) -> Noise:
-    """Return variances of noise with which all rows of some records have a covariance."""
+def with_least_noise(noise: Noise, records: Sequence[ExpandedRecord], curves: Curves) -> Noise:
+    """Return variances of noise with which all rows of some records have a covariance; curves are all coefficients, about.
+
+    Where no torque acts at all, what the motion makes of the coefficients is what else there is to compare with.
+    """
     largest = max(float(np.mean(one.torques**2, axis=1).max()) for one in records)
+    largest = largest or max(_largest_term(one, curves) for one in records)
     least = largest * _QUIET**2 or 1.0
     return noise[0], [max(one, least) for one in noise[1]]
+
+
+def _largest_term(record: ExpandedRecord, curves: Curves) -> float:
+    """Return the mean square of the largest product of a coefficient and what it multiplies, about."""
+    kernels, largest = record.kernels, 0.0
+    for entries, values in curves:
+        level = float(np.mean(values[0] ** 2))
+        for _, role, number, factor in entries:
+            is_term = role == "term"
+            # Derivatives are as much larger as their kernels are.
+            by = 1.0 if is_term else float(np.sum(parts(role, kernels)[0] ** 2) / np.sum(kernels.value**2))
+            channel = record.terms[number] if is_term else record.angles[number]
+            largest = max(largest, factor**2 * level * by * float(np.mean(channel**2)))
+    return largest
 
 
 class WhitenedRows:

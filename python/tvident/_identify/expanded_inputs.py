@@ -171,4 +171,4 @@ class ExpandedInputs:
         # A channel tells the noise of all samples, parameters are found with that of one of mean weight.
         mean = 1.0 if self.data.weights is None else self.data.weights.spread[0]
         torque = float(shown[0]) if shown else _core.noise(self.data.torques)[0].sigma ** 2 / mean
-        return with_least_noise(([angle.sigma**2 / mean], [torque]), [self.record])
+        return with_least_noise(([angle.sigma**2 / mean], [torque]), [self.record], self.start)

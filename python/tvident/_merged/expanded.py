@@ -79,7 +79,7 @@ class ExpandedEquations:
         is_deficient = Status.RANK_DEFICIENT in Status(self.windows.record_status)
         if not self.windows.window_length or (is_deficient and bool(np.all(self.windows.status & Status.INVALID))):
             return None
-        noise = with_least_noise(self.windows.noise, self._records)
+        noise = with_least_noise(self.windows.noise, self._records, self._start)
         search = SizeSearch(self._records, self._parts, noise, self._known)
         found = search.run(self._start)
         expansions = self.equations.expansions
