@@ -1,4 +1,4 @@
-"""A base that is known moves masses on which no force acts."""
+"""A base that is known moves masses on which no force acts; inertias that are negative."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import pytest
 import tvident
 from merged.simulated import Masses, chain
 from parameters import long
+from tvident import Status
 
 Array = npt.NDArray[np.float64]
 
@@ -36,14 +37,13 @@ def held(t: Array) -> Array:
     return 18 + 0 * t
 
 
-def identified(masses: Masses, **options: Any) -> Any:
+def identified(masses: Masses, torque: Array | None = None, **options: Any) -> Any:
     count = len(masses.angle)
     springs: list[tuple[Any, int]] = [("base" if mass == 0 else mass - 1, mass) for mass in range(count)]
     structure = tvident.Chain(count, springs, base=masses.base)
+    torque = np.zeros_like(masses.torque) if torque is None else torque
     identify: Any = tvident.identify
-    return identify(
-        masses.angle, np.zeros_like(masses.torque), structure=structure, sample_rate=1000, dof_axis=0, **options
-    )
+    return identify(masses.angle, torque, structure=structure, sample_rate=1000, dof_axis=0, **options)
 
 
 @pytest.mark.parametrize(
@@ -86,3 +86,21 @@ def test_an_expansion_knows_its_errors_where_a_base_moves_alone(seed: int) -> No
     assert np.mean(np.abs(error) < 2.5 * found.stderr["stiffness_base_0"]) > 0.8
     value, stderr = found.constants["inertia_0"]
     assert abs(value - 0.02) < 4 * stderr < 1e-3
+
+
+def test_nothing_is_trusted_beside_an_inertia_that_is_negative() -> None:
+    # A torque whose sign is wrong: the verdict said so, and all samples were trusted.
+    simulated = chain([held, held], 4000, seed=46)
+    assert identified(simulated, simulated.torque).trusted.all()
+    rigs = [tvident.simulate_torsional_rig(duration=1.0, seed=seed) for seed in range(4)]
+    identify: Any = tvident.identify
+    trials = identify(
+        np.stack([rig.angle for rig in rigs]),
+        -np.stack([rig.torque for rig in rigs]),
+        sample_rate=1000,
+        ensemble_axis=0,
+    )
+    for found in (identified(simulated, -simulated.torque), trials):
+        assert "is negative" in found.summary().splitlines()[0]
+        assert found.record_status & Status.ILL_CONDITIONED
+        assert not found.trusted.any()

@@ -21,6 +21,7 @@ from tvident._merged.merging import Identifiable, Merging, Part
 from tvident._merged.oscillating import Oscillating
 from tvident._merged.reported import Reported
 from tvident._merged.short import as_html, in_one_line
+from tvident._merged.verdict import wrong_inertia
 from tvident._merged.words import whose
 from tvident._results import ExpandedParameter, samples_between, scan_of
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
@@ -147,6 +148,9 @@ class MergedIdentification(Oscillating, Reported):
         self.settings = self._settings()
         self.scans = tuple(scan_of(part.found.scan, part.names) for part in merging.parts if part.found.scan.tried)
         self.derive()
+        if wrong_inertia(self, merging):
+            # No machine has that: something else was told from it badly.
+            self.record_status |= Status.ILL_CONDITIONED
 
     @classmethod
     def of_known(cls, merging: Merging, known: Mapping[str, Any]) -> MergedIdentification:

@@ -84,12 +84,23 @@ def _explained(result: Any, merging: Merging) -> float | None:
 
 def _sign(result: Any, merging: Merging) -> str | None:
     """Return what is wrong with a sign: moving a mass takes energy, in whatever direction."""
+    words = wrong_inertia(result, merging)
+    if words or merging.masses or result.kinds["damping"] == "known":
+        return words
+    words = negative(result.damping, result.stderr["damping"])
+    return f"damping {words}" if words else None
+
+
+def wrong_inertia(result: Any, merging: Merging) -> str | None:
+    """Return which inertia is negative, of trials or of a mass, and how often; None where that may be chance, or was given.
+
+    See Also
+    --------
+    verdict_of : says it first.
+    """
     if not merging.masses:
-        for name in ("inertia", "damping"):
-            words = negative(result.elements[name], result.stderr[name]) if result.kinds[name] != "known" else None
-            if words:
-                return f"{name} {words}"
-        return None
+        words = negative(result.inertia, result.stderr["inertia"]) if result.kinds["inertia"] != "known" else None
+        return f"inertia {words}" if words else None
     for mass in range(merging.masses):
         words = negative(result.inertia[mass, mass], result.stderr["inertia"][mass, mass])
         if words:
