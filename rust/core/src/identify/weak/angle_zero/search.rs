@@ -15,6 +15,7 @@ use crate::identify::weak::lag::Settled;
 use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::JudgedTerm;
 use crate::regression::model::Model;
+use crate::weak_form::test_function::TestFunction;
 
 /// Times that test function and windows are chosen again with the angle that was found.
 const CHOICES: usize = 3;
@@ -29,10 +30,30 @@ const SETTLED: f64 = 0.02;
 const CHOSEN: f64 = 0.3;
 /// It is there beyond so many standard errors, as a term is suspected.
 const CONSPICUOUS: f64 = 5.0;
+/// One that is tried, and within so many standard errors beside all that varies slowly, will not be there.
+const FAR_FROM_THERE: f64 = 2.0;
 /// The part of what an offset that is free in every window explains that the angle must explain.
 const LEAST_SHARE: f64 = 0.9;
 /// The same of rows that were chosen without it.
 const LEAST_SHARE_BEFORE: f64 = 0.5;
+
+/// Where the search for the angle begins with one choice of test function and windows, and the error that the angle has in the end.
+#[derive(Clone, Copy)]
+struct Approached {
+    function: TestFunction,
+    zero: f64,
+    noise: [f64; 2],
+    lag: f64,
+    error: f64,
+}
+
+impl Approached {
+    /// Whether another choice begins in the same place, so that the same follows.
+    fn is_as_good_as(&self, other: &Self) -> bool {
+        let prepared = |one: &Self| (one.function, one.noise, one.lag);
+        prepared(self) == prepared(other) && (self.zero - other.zero).abs() <= SETTLED * self.error
+    }
+}
 
 impl Session<'_, '_, '_> {
     /// Decides with the test function that was chosen, and where the record contradicts a constant offset, tries an angle other than zero at which
@@ -129,10 +150,17 @@ impl Session<'_, '_, '_> {
     /// Chooses and decides around an angle and moves it until nothing remains; `None` if the rows do not determine it. Where an offset is
     /// given to compare with, also if the angle is no better or within its error of zero.
     fn settle_around(&mut self, model: &Model, offset: Option<usize>) -> Result<Option<Settled>, Error> {
+        let mut before: Option<Approached> = None;
         for choice in 1..=CHOICES {
             let start = self.record.angle_zero;
             let mut chosen = self.choose(model)?;
             if !self.approach(&mut chosen, model)? {
+                return Ok(None);
+            }
+            let (zero, noise, lag) = (self.record.angle_zero, self.noise, self.record.lag);
+            let begun = Approached { function: chosen.weak.function, zero, noise, lag, error: 0.0 };
+            if offset.is_some() && before.is_some_and(|before| before.is_as_good_as(&begun)) {
+                // What was not there then will not be there now.
                 return Ok(None);
             }
             if let Some(offset) = offset.filter(|_| choice == 1)
@@ -144,6 +172,11 @@ impl Session<'_, '_, '_> {
             let mut step = 1;
             let error = loop {
                 let Some((left, error)) = self.left_of_zero(&chosen, &decided)? else { return Ok(None) };
+                let nearly = self.record.angle_zero + left;
+                if offset.is_some() && !decided.slow.is_empty() && nearly.abs() < FAR_FROM_THERE * error {
+                    // The search for what varies takes longest of all: it is not made once more for what will not be there.
+                    return Ok(None);
+                }
                 if left.abs() <= SETTLED * error {
                     break error;
                 }
@@ -162,6 +195,7 @@ impl Session<'_, '_, '_> {
                 let is_there = offset.is_none() || zero.abs() > CONSPICUOUS * error;
                 return Ok(is_there.then_some((chosen, decided, lag)));
             }
+            before = (zero.abs() <= CONSPICUOUS * error).then_some(Approached { error, ..begun });
         }
         Ok(None)
     }
@@ -256,5 +290,26 @@ impl Session<'_, '_, '_> {
         let left = found.constants.remove(place);
         let value = self.record.angle_zero + left.value;
         value.is_finite().then_some(AngleZero { value, error: left.error })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_choice_is_as_good_as_one_that_begins_in_the_same_place() {
+        let function = |half: usize| TestFunction::new(half, 9, 1e-3).expect("a test function");
+        let (zero, error) = (8.6e-5, 1.8e-5);
+        let one = Approached { function: function(11), zero, noise: [1e-10, 6e-4], lag: 0.0, error };
+        let at = |zero: f64| Approached { zero, error: 0.0, ..one };
+        assert!(one.is_as_good_as(&at(zero + 0.9 * SETTLED * error)));
+        assert!(!one.is_as_good_as(&at(zero - 1.1 * SETTLED * error)));
+        let others = [
+            Approached { function: function(12), ..one },
+            Approached { noise: [1e-10, 7e-4], ..one },
+            Approached { lag: 0.5, ..one },
+        ];
+        assert!(others.iter().all(|other| !one.is_as_good_as(other)));
     }
 }

@@ -3,6 +3,7 @@
 //! A zero of the torque that drifts is nothing that a windowed stiffness may follow, but it does: a drift of 5 % of the torque moves it by half
 //! a percent, one of 30 % by 1 to 26 %. Beside an offset that is free in every window it is as good as without a drift.
 
+use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::identify::weak::angle_zero::outcome::FreeOffset;
 use crate::identify::weak::choice::Chosen;
@@ -11,6 +12,7 @@ use crate::identify::weak::lag::Settled;
 use crate::identify::weak::session::Session;
 use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
+use crate::weak_form::test_function::TestFunction;
 use crate::weak_form::test_function_choice::spectrum_length;
 
 /// Typical cycles that a record must last: in less than one a part of it does not tell an offset from the motion, and parts are eight.
@@ -50,7 +52,16 @@ impl Session<'_, '_, '_> {
         (self.windowed_offset, self.most_slow) = (None, None);
         // Errors are compared on the same rows: those that were chosen beside a constant offset are long enough to hide what drifts.
         let least = if differs { 1.0 } else { BETTER };
-        if is_possible && error < least * self.error_beside_constant(&settled.0, model, &constant)? {
+        let is_known = (self.record.lag, self.noise) == (before.1, before.2)
+            && Searched::of(&constant).finds_what(&Searched::of(&settled))
+            && constant.1.fit.is_some()
+            && !constant.1.slow.is_empty();
+        let beside = match is_possible {
+            true if is_known => constant.1.error,
+            true => self.error_beside_constant(&settled.0, model, &constant)?,
+            false => 0.0,
+        };
+        if is_possible && error < least * beside {
             self.windowed_offset = Some(offset);
             self.free_offset = FreeOffset::default();
             return Ok(settled);
@@ -73,5 +84,46 @@ impl Session<'_, '_, '_> {
         let mut same = Chosen { weak, fitted: None, fitted_before: None, ..*chosen };
         let found = self.decide(&mut same, model)?;
         Ok(if found.fit.is_some() { found.error } else { f64::INFINITY })
+    }
+}
+
+/// Where what varies and jumps was searched, which takes longest of all.
+#[derive(Clone, Copy)]
+struct Searched<'a> {
+    function: TestFunction,
+    /// Rows, before those over jumps were left out.
+    rows: &'a Rows,
+    jumps: usize,
+}
+
+impl<'a> Searched<'a> {
+    fn of((Chosen { weak, .. }, decided, _): &'a Settled) -> Self {
+        let rows = decided.whole.as_ref().unwrap_or(&weak.rows);
+        Self { function: weak.function, rows, jumps: weak.rows.jumps.len() }
+    }
+
+    /// Whether a search in rows of another would find the same: those of the same test function, with the same equations. More jumps that are known of the
+    /// other might help it.
+    fn finds_what(&self, other: &Self) -> bool {
+        self.function == other.function && self.rows.usable == other.rows.usable && other.jumps <= self.jumps
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::simulated::rows;
+
+    #[test]
+    fn nothing_is_searched_twice_in_the_same_rows() {
+        let function = |half: usize| TestFunction::new(half, 9, 1e-3).expect("a test function");
+        let some = rows(200, |_| [1.0, 0.0], 0.1);
+        let mut fewer = some.clone();
+        fewer.exclude([50].into_iter());
+        let one = Searched { function: function(11), rows: &some, jumps: 1 };
+        assert!(one.finds_what(&one) && one.finds_what(&Searched { jumps: 0, ..one }));
+        assert!(!one.finds_what(&Searched { jumps: 2, ..one }), "jumps that only the other knows may help");
+        assert!(!one.finds_what(&Searched { function: function(12), ..one }));
+        assert!(!one.finds_what(&Searched { rows: &fewer, ..one }));
     }
 }
