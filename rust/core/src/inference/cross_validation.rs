@@ -5,6 +5,7 @@ use std::ops::Range;
 use crate::error::Error;
 use crate::exec::stages::Stages;
 use crate::inference::moving::moving;
+use crate::regression::block_sums::BlockSums;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::predictor::{Predictor, without_constants};
@@ -70,9 +71,10 @@ pub(crate) fn validate(
     stages: &mut Stages<'_, '_>,
 ) -> Result<Vec<Validated>, Error> {
     let compared = ComparedRows::new(problem, scales);
+    let sums = BlockSums::new(problem, scales.iter().map(|scale| scale.step), instructions, stages)?;
     let mut validated = Vec::new();
     for some in Scale::together(scales, problem.rows()) {
-        let fits = Fit::of_lengths(problem, some, expected, instructions, stages)?;
+        let fits = Fit::of_lengths((problem, sums.as_ref()), some, expected, instructions, stages)?;
         for (&scale, fit) in some.iter().zip(fits).filter_map(|(scale, fit)| Some((scale, fit?))) {
             let (error, parts) = compared.errors(problem, scale, &fit, expected.variance);
             validated.push(Validated { fit, error, parts });
@@ -156,9 +158,10 @@ pub(crate) fn best_length(
     stages: &mut Stages<'_, '_>,
 ) -> Result<Option<(Scale, f64)>, Error> {
     let compared = ComparedRows::new(problem, scales);
+    let sums = BlockSums::new(problem, left.iter().map(|scale| scale.step), instructions, stages)?;
     let mut best: Option<(Scale, f64)> = None;
     for some in Scale::together(left, problem.rows()) {
-        let fits = Fit::of_lengths(problem, some, expected, instructions, stages)?;
+        let fits = Fit::of_lengths((problem, sums.as_ref()), some, expected, instructions, stages)?;
         for (&scale, fit) in some.iter().zip(fits).filter_map(|(scale, fit)| Some((scale, fit?))) {
             let error = compared.error(problem, scale, &fit, expected.variance);
             if best.is_none_or(|(_, least)| error.total_cmp(&least).is_lt()) {

@@ -8,6 +8,10 @@
 use std::cell::RefCell;
 use std::ops::Range;
 
+use crate::error::Error;
+use crate::exec::pool::Piece;
+use crate::exec::stages::Stages;
+use crate::regression::block_sums::BlockSums;
 use crate::regression::dyadic_kernels::{Merges, Solves, Summaries, memory};
 use crate::regression::problem::Problem;
 use crate::regression::solve::SolveScratch;
@@ -16,6 +20,9 @@ use crate::regression::summary_table::Table;
 use crate::simd::f64x8::{Packet, WIDTH};
 use crate::simd::instructions::Instructions;
 use crate::simd::vectors::dispatch;
+
+/// Cells in a piece of work.
+pub(crate) const PIECE: usize = 512;
 
 /// A thread keeps the memory of a table with at most so many numbers for its next piece of work.
 const MOST_KEPT: usize = 1 << 17;
@@ -67,8 +74,20 @@ pub(crate) fn solve_windows(
     shapes: &[WindowShape],
     instructions: Instructions,
 ) -> Vec<Solved> {
+    solve_windows_of(problem, None, (step, blocks), shapes, instructions)
+}
+
+/// The same, with the sums of blocks where they are known. They were summed in another order: other rounding.
+fn solve_windows_of(
+    problem: &Problem<'_>,
+    sums: Option<&BlockSums>,
+    (step, blocks): (usize, &Range<isize>),
+    shapes: &[WindowShape],
+    instructions: Instructions,
+) -> Vec<Solved> {
     let mut tables = TABLES.take();
-    let mut solved = DyadicWindows { problem, step, blocks, instructions }.solve(shapes, &mut tables);
+    let known = sums.and_then(|sums| sums.of(step));
+    let mut solved = DyadicWindows { problem, known, step, blocks, instructions }.solve(shapes, &mut tables);
     tables.iter_mut().filter(|table| table.len() > MOST_KEPT).for_each(|table| *table = Table::default());
     TABLES.set(tables);
     if !problem.jumps.is_empty() {
@@ -90,9 +109,35 @@ thread_local! {
     static TABLES: RefCell<Vec<Table>> = const { RefCell::new(Vec::new()) };
 }
 
+/// Solves windows of some shapes, so many of each, around the first cells and those that follow.
+pub(crate) fn solve_shapes(
+    (problem, sums): (&Problem<'_>, Option<&BlockSums>),
+    step: usize,
+    shapes: &[(WindowShape, usize)],
+    instructions: Instructions,
+    stages: &mut Stages<'_, '_>,
+) -> Result<Vec<Solved>, Error> {
+    let end = shapes.iter().map(|(_, cells)| *cells).max().unwrap_or(0).cast_signed();
+    let pieces = (0..end).step_by(PIECE).map(|first| first..(first + PIECE.cast_signed()).min(end));
+    let pieces = pieces.map(|blocks| Piece { size: blocks.len() * step, content: blocks });
+    let alone: Vec<WindowShape> = shapes.iter().map(|(shape, _)| shape.clone()).collect();
+    let work =
+        |blocks: Range<isize>, (): &mut ()| solve_windows_of(problem, sums, (step, &blocks), &alone, instructions);
+    let solved = stages.map(pieces.collect(), || (), work)?;
+    if solved.is_empty() {
+        return Ok(vec![Solved::new(problem.layout, 0, 0); shapes.len()]);
+    }
+    let of = |(shape, (_, cells)): (usize, &(WindowShape, usize))| {
+        Solved::join_first(&solved.iter().map(|part| &part[shape]).collect::<Vec<_>>(), *cells)
+    };
+    Ok(shapes.iter().enumerate().map(of).collect())
+}
+
 /// Windows of every block in a range.
 struct DyadicWindows<'a, 'b> {
     problem: &'a Problem<'b>,
+    /// The sums of all blocks of the record, and how many there are.
+    known: Option<(&'a Table, usize)>,
     step: usize,
     blocks: &'a Range<isize>,
     instructions: Instructions,
@@ -152,9 +197,17 @@ impl DyadicWindows<'_, '_> {
     /// Summarises single blocks, as many as there are windows of one block, and by doubling the windows of 2, 4, 8, … of them.
     fn fill(&self, tables: &mut [Table], levels: usize, count: usize, memory: &mut [Packet]) {
         let layout = self.problem.layout;
-        let &Self { problem, step, blocks, instructions } = self;
+        let &Self { problem, step, blocks, instructions, .. } = self;
         tables[0].resize(layout.size(), count);
-        dispatch(instructions, Summaries { problem, step, first: blocks.start, count, table: &mut tables[0], memory });
+        match (self.known, usize::try_from(blocks.start)) {
+            (Some((known, all)), Ok(first)) if first + count <= all => {
+                tables[0].copy(layout.size(), (known, first, 1), 0..count);
+            }
+            _ => {
+                let (first, table) = (blocks.start, &mut tables[0]);
+                dispatch(instructions, Summaries { problem, step, first, count, table, memory });
+            }
+        }
         for level in 0..levels {
             let half = 1 << level;
             let count = count + 1 - 2 * half;

@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
 use crate::noise::median::median;
+use crate::regression::block_sums::BlockSums;
 use crate::regression::constants::{Expected, Pooled, pool};
 use crate::regression::dyadic_windows::{WindowShape, solve_windows};
 use crate::regression::problem::Problem;
@@ -64,18 +65,18 @@ impl Fit {
         instructions: Instructions,
         stages: &mut Stages<'_, '_>,
     ) -> Result<Option<Self>, Error> {
-        Ok(Self::of_lengths(problem, &[scale], expected, instructions, stages)?.pop().flatten())
+        Ok(Self::of_lengths((problem, None), &[scale], expected, instructions, stages)?.pop().flatten())
     }
 
-    /// The same for several lengths of windows, which have one step.
+    /// The same for several lengths of windows, which have one step, with the sums of blocks where they are known.
     pub(crate) fn of_lengths(
-        problem: &Problem<'_>,
+        (problem, sums): (&Problem<'_>, Option<&BlockSums>),
         scales: &[Scale],
         expected: Expected,
         instructions: Instructions,
         stages: &mut Stages<'_, '_>,
     ) -> Result<Vec<Option<Self>>, Error> {
-        let solved = Scale::solve_leave_gap_out(scales, problem, instructions, stages)?;
+        let solved = Scale::solve_leave_gap_out(scales, (problem, sums), instructions, stages)?;
         let fit = |(&scale, [leave_gap_out, full]): (&Scale, [Solved; 2])| {
             let pooled = pool(&full, 0..full.len(), expected, instructions)?;
             let (step, span) = (scale.step, scale.span());

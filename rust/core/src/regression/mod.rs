@@ -3,6 +3,7 @@
 pub(crate) mod block_fit;
 pub(crate) mod block_products;
 pub(crate) mod block_scatter;
+pub(crate) mod block_sums;
 pub(crate) mod centred_windows;
 pub(crate) mod constants;
 pub(crate) mod dyadic_kernels;

@@ -1,5 +1,7 @@
 //! Tables of summaries: one column for every entry of a summary, one row for every window.
 
+use std::ops::Range;
+
 use crate::simd::f64x8::{Packet, WIDTH};
 
 /// Summaries of consecutive windows of one length.
@@ -22,6 +24,15 @@ impl Table {
     /// How many numbers its memory holds.
     pub(crate) fn len(&self) -> usize {
         self.values.len()
+    }
+
+    /// Copies summaries of so many entries to some places: others from one on, every so many of them.
+    pub(crate) fn copy(&mut self, size: usize, (others, first, every): (&Self, usize, usize), places: Range<usize>) {
+        for entry in 0..size {
+            let from = &others.values[entry * others.padded..][..others.padded];
+            let to = &mut self.values[entry * self.padded..][places.clone()];
+            to.iter_mut().zip(from[first..].iter().step_by(every)).for_each(|(to, from)| *to = *from);
+        }
     }
 
     #[inline(always)]

@@ -9,15 +9,13 @@ use std::ops::Range;
 use crate::error::Error;
 use crate::exec::pool::Piece;
 use crate::exec::stages::Stages;
-use crate::regression::dyadic_windows::{WindowShape, solve_windows};
+use crate::regression::block_sums::BlockSums;
+use crate::regression::dyadic_windows::{PIECE, WindowShape, solve_shapes, solve_windows};
 use crate::regression::layout::Layout;
 use crate::regression::problem::Problem;
 use crate::regression::sides::Sides;
 use crate::regression::solved::{Solved, fewest_rows};
 use crate::simd::instructions::Instructions;
-
-/// Cells in a piece of work.
-const PIECE: usize = 512;
 
 /// Of at most so many rows windows of several lengths are solved together.
 const MOST_TOGETHER: usize = 1 << 15;
@@ -196,13 +194,13 @@ impl Scale {
         stages: &mut Stages<'_, '_>,
     ) -> Result<Solved, Error> {
         let ([_, _, full], cells) = (self.shapes(), self.full_cells(problem.rows()).len());
-        Ok(solve_shapes(problem, self.step, &[(full, cells)], instructions, stages)?.swap_remove(0))
+        Ok(solve_shapes((problem, None), self.step, &[(full, cells)], instructions, stages)?.swap_remove(0))
     }
 
     /// Solves the windows of lengths that have one step, those that leave the gap out and the full ones, in parallel.
     pub(crate) fn solve_leave_gap_out(
         scales: &[Self],
-        problem: &Problem<'_>,
+        (problem, sums): (&Problem<'_>, Option<&BlockSums>),
         instructions: Instructions,
         stages: &mut Stages<'_, '_>,
     ) -> Result<Vec<[Solved; 2]>, Error> {
@@ -212,7 +210,7 @@ impl Scale {
             [(leave_gap_out, cells), (full, cells)]
         };
         let shapes: Vec<_> = scales.iter().flat_map(of).collect();
-        let mut solved = solve_shapes(problem, first.step, &shapes, instructions, stages)?.into_iter();
+        let mut solved = solve_shapes((problem, sums), first.step, &shapes, instructions, stages)?.into_iter();
         Ok(std::iter::from_fn(|| Some([solved.next()?, solved.next()?])).collect())
     }
 
@@ -270,28 +268,6 @@ impl Scale {
     }
 }
 
-/// Solves windows of some shapes, so many of each, around the first cells and those that follow.
-fn solve_shapes(
-    problem: &Problem<'_>,
-    step: usize,
-    shapes: &[(WindowShape, usize)],
-    instructions: Instructions,
-    stages: &mut Stages<'_, '_>,
-) -> Result<Vec<Solved>, Error> {
-    let end = shapes.iter().map(|(_, cells)| *cells).max().unwrap_or(0).cast_signed();
-    let pieces = (0..end).step_by(PIECE).map(|first| first..(first + PIECE.cast_signed()).min(end));
-    let pieces = pieces.map(|blocks| Piece { size: blocks.len() * step, content: blocks });
-    let alone: Vec<WindowShape> = shapes.iter().map(|(shape, _)| shape.clone()).collect();
-    let work = |blocks: Range<isize>, (): &mut ()| solve_windows(problem, step, &blocks, &alone, instructions);
-    let solved = stages.map(pieces.collect(), || (), work)?;
-    if solved.is_empty() {
-        return Ok(vec![Solved::new(problem.layout, 0, 0); shapes.len()]);
-    }
-    let of =
-        |(shape, (_, cells)): (usize, &(WindowShape, usize))| Solved::join_first(&of_shape(&solved, shape), *cells);
-    Ok(shapes.iter().enumerate().map(of).collect())
-}
-
 /// Joins the parts of each shape.
 fn join(mut parts: Vec<Vec<Solved>>, layout: Layout) -> Cells {
     let mut of = |shape: usize| match &mut parts[..] {
@@ -346,7 +322,8 @@ mod tests {
         let scales = Scale::all(120, 2);
         let (mut short, mut long) = (0, 0);
         for scale in scales {
-            let solved = staged(|stages| Scale::solve_leave_gap_out(&[scale], &problem, Instructions::Scalar, stages));
+            let solved =
+                staged(|stages| Scale::solve_leave_gap_out(&[scale], (&problem, None), Instructions::Scalar, stages));
             let [leave_gap_out, _] = &solved[0];
             let any = (0..leave_gap_out.len()).any(|window| is_determined(leave_gap_out, window));
             assert_eq!(any, scale.predicts(problem.layout), "{scale:?}");
@@ -400,7 +377,8 @@ mod tests {
             let (beside, part) = (here(true, false), here(false, true));
             assert_eq!([beside.leave_gap_out.len(), beside.full.len(), part.one_sided.len()], [0; 3]);
             let part = Cells { one_sided: beside.one_sided, ..part };
-            let alone = staged(|stages| Scale::solve_leave_gap_out(&[scale], &problem, Instructions::Scalar, stages));
+            let alone =
+                staged(|stages| Scale::solve_leave_gap_out(&[scale], (&problem, None), Instructions::Scalar, stages));
             let [gap, full] = &alone[0];
             for cell in some.clone() {
                 let pairs = [
@@ -433,11 +411,12 @@ mod tests {
         assert!(together.iter().any(|some| some.len() > 4) && together.concat() == scales);
         assert_eq!(Scale::together(&scales, MOST_TOGETHER + 1).len(), scales.len());
         for some in together {
-            let all = staged(|stages| Scale::solve_leave_gap_out(some, &problem, Instructions::Scalar, stages));
+            let all = staged(|stages| Scale::solve_leave_gap_out(some, (&problem, None), Instructions::Scalar, stages));
             assert_eq!(all.len(), some.len());
             for (scale, both) in some.iter().zip(&all) {
-                let alone =
-                    staged(|stages| Scale::solve_leave_gap_out(&[*scale], &problem, Instructions::Scalar, stages));
+                let alone = staged(|stages| {
+                    Scale::solve_leave_gap_out(&[*scale], (&problem, None), Instructions::Scalar, stages)
+                });
                 for (one, other) in both.iter().zip(&alone[0]) {
                     assert_eq!((one.first, one.len()), (other.first, scale.full_cells(900).len()));
                     (0..one.fields.size()).for_each(|field| assert_eq!(one.field(field), other.field(field)));
