@@ -364,6 +364,20 @@ def test_what_no_window_follows_is_said_with_what_does(seed: int) -> None:
     assert rms(expanded.stiffness, fast(expanded.time)) < 0.03
 
 
+def test_what_is_late_in_every_trial_is_no_change_that_windows_miss() -> None:
+    """Trials that move alike have what is late or missing in common, too."""
+    generator = np.random.default_rng(2)
+    rig = tvident.simulate_torsional_rig(duration=4.0, seed=2, pattern="slider")
+    torque = np.roll(rig.true_torque, 3)
+    angles, torques = (
+        np.stack([one + noise * np.std(one) * generator.standard_normal(one.size) for _ in range(8)])
+        for one, noise in ((rig.true_angle, 1e-4), (torque, 1e-2))
+    )
+    found = identify(angles, torques, **OPTIONS)
+    assert found.record_status & tvident.Status.LAG_SUSPECTED
+    assert not any("faster than they follow" in line for line in found.advice)
+
+
 @pytest.mark.parametrize("window_length", [17, 65])
 def test_trials_that_share_all_differ_by_their_noise(window_length: int) -> None:
     """The angles' noise and the growth of what is windowed were differences of trials: 11 to 15 errors of the inertia, 3 of the damping."""

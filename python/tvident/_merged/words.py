@@ -24,6 +24,8 @@ _DOUBTS = {
     "or coupled in another way",
 }
 
+_OTHER_CAUSES = Status.LAG_SUSPECTED | Status.TERM_SUSPECTED | Status.CHANNEL_SUSPECTED
+
 _SILENT = (
     "the equation of a mass on which no force acts leaves more than noise explains, and where no force holds them parameters are drawn "
     "towards zero: do not trust the numbers; look for a spring that changes ('windowed', or an Expansion), or let a force that is measured "
@@ -42,8 +44,9 @@ def words_of(result: Any, merging: Merging, scatter: Mapping[str, float]) -> Wor
             reasons += one.words.reasons
             advice += one.words.advice
         else:
-            advice += _unfollowed(result) if one.changes_in_common else []
             advice += [words for flag, words in _DOUBTS.items() if one.record_status & flag]
+            # What is missing or late acts alike in trials that move alike.
+            advice += _unfollowed(result) if one.changes_in_common and not one.record_status & _OTHER_CAUSES else []
         advice += [_SILENT] if one.misfit > 1 else []
         advice += _channels_of(part, merging.masses, sampling.period)
         advice += _lacking_terms(part, merging)
