@@ -213,6 +213,22 @@ def test_windows_that_lack_samples_have_orders_of_their_own_beside_others(select
         assert np.array_equal(getattr(found, name)[..., lack], getattr(own, name)[..., lack]), name
 
 
+@pytest.mark.parametrize("loss", ["squares", "huber"])
+@pytest.mark.parametrize("held", [np.nan, np.inf, 1e300])
+@pytest.mark.filterwarnings("error")
+def test_what_has_no_weight_may_hold_anything(loss: Any, held: float) -> None:
+    y, weights = np.sin(np.arange(120) / 9), np.ones(120)
+    y[50], weights[50] = held, 0
+    call: dict[str, Any] = {"order": 2, "weights": weights, "loss": loss}
+    found = tvident.fit_local_polynomials(y, 21, nan_policy="raise", **call)
+    assert np.isfinite(found.derivatives).all()
+    y[50] = 0
+    np.testing.assert_array_equal(found.derivatives, tvident.fit_local_polynomials(y, 21, **call).derivatives)
+    y[60] = np.nan
+    with pytest.raises(ValueError, match="sample 60 is nan"):
+        tvident.fit_local_polynomials(y, 21, nan_policy="raise", **call)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("weighted", [False, True])
 def test_hubers_loss_leaves_out_what_is_missing(weighted: bool) -> None:

@@ -261,10 +261,10 @@ def _block(samples: Any, weights: Any, part: Part, asked: AskedOfBlocks, quantis
     """Return the estimates of one block, on one thread: dask has others."""
     first, end = part[0]
     samples = np.ascontiguousarray(samples)
-    if asked.raises and not np.isfinite(samples[first - part[1][0] : end - part[1][0]]).all():
-        raise ValueError(f"samples {first} to {end} must be finite; some are not; use nan_policy='omit' or 'propagate'")
     core_plan, gaps = asked.plan(quantisation), _gaps(asked, weights)
     whole = samples if gaps is None else gaps.plain(samples)
+    if asked.raises and not np.isfinite(whole[first - part[1][0] : end - part[1][0]]).all():
+        raise ValueError(f"samples {first} to {end} must be finite; some are not; use nan_policy='omit' or 'propagate'")
     found = core_plan.estimate(whole, step=asked.step, part=part, workers=1)
     if gaps is not None:
         # Into the arrays of the estimates.

@@ -15,7 +15,14 @@ from tvident._derivatives.automatic import choose
 from tvident._derivatives.automatic_gaps import choose_beside_gaps
 from tvident._derivatives.fit import LocalPolynomialFit, Sampled, unit_of_samples
 from tvident._derivatives.found import Found
-from tvident._derivatives.incomplete import check_weighted, filled, incomplete_given, left_out, longest_gap
+from tvident._derivatives.incomplete import (
+    check_weighted,
+    filled,
+    incomplete_given,
+    left_out,
+    longest_gap,
+    weights_along,
+)
 from tvident._derivatives.own_times import at_own_times, left_out_of_own_times, period_or_times
 from tvident._derivatives.plans import HIGHEST_ORDER, SHORTEST_WINDOW, plan, quantisation_step
 from tvident._derivatives.robust import robust, value_in
@@ -219,7 +226,10 @@ def fit_local_polynomials(
     t, seconds, times = period_or_times(y, samples, delta=delta, sample_rate=sample_rate, t=t)
     arguments.one_of("criterion", criterion, get_args(Criterion))
     arguments.one_of("selection", selection, get_args(Selection))
-    arguments.check_nan("y", array, nan_policy, arguments.RowPolicy)
+    counted = None if weights is None else weights_along(weights, array.shape, axis)
+    arguments.check_nan(
+        "y", array if counted is None else np.where(counted > 0, samples, 0), nan_policy, arguments.RowPolicy
+    )
     max_order = arguments.whole_number("max_order", max_order, least=0, most=HIGHEST_ORDER)
     order = None if order is None else arguments.whole_number("order", order, least=0, most=HIGHEST_ORDER)
     # Derivatives above the highest order are zero.

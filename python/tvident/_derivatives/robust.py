@@ -110,6 +110,8 @@ def with_clipped_residuals(
 
     if weights is not None:
         own = np.broadcast_to(weights, samples.shape).reshape(records.shape)
+        # What has no weight may hold anything.
+        records = np.where(own > 0, records, np.nan)
         each = [
             clipped(record[None], np.isfinite(record) & (one > 0), one[None])
             for record, one in zip(records, own, strict=True)
