@@ -60,7 +60,9 @@ def with_clipped_torque(data: Data, loss: LossAsked, identified: Callable[[Data]
             clipped = clip_residuals(given, predicted)
             with np.errstate(invalid="ignore"):  # infinite samples stay as they are
                 moved = np.abs(clipped.values - torques[record] * root)
-            torques[record], shares[record] = clipped.values / root, clipped.share
+            # Where the prediction is far noisier than the sample, that stays as it is.
+            kept = np.where(np.isnan(root), recorded[record], clipped.values / root)
+            torques[record], shares[record] = kept, clipped.share
             if not np.nanmax(moved, initial=0.0) > _SETTLED * clipped.scale:
                 open_records.remove(record)
         if not open_records:
@@ -73,4 +75,5 @@ def _root(data: Data, place: tuple[int, ...], found: Identification) -> npt.NDAr
     length = found.settings["window_length"]
     if data.weights is None or not isinstance(length, int):
         return np.ones(1)
-    return data.weights.part(place).roots(length)
+    # The prediction is made in windows half as long.
+    return data.weights.part(place).roots(length // 2)

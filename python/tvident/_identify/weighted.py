@@ -17,6 +17,9 @@ Array = npt.NDArray[np.float64]
 MOST_OF_FIRST: Final = 1e100
 """Times the first weight of a recording that others may be: sums of squares stay within the range of doubles."""
 
+_MOST_AROUND: Final = 2.0
+"""Times a sample's own variance that the mean of the samples around it may be, for what these predict to be compared with it."""
+
 
 @dataclass(frozen=True)
 class Weights:
@@ -72,7 +75,8 @@ class Weights:
     def roots(self, length: int) -> Array:
         """Return what residuals of the samples of a record are multiplied by to have the same noise.
 
-        A residual has the noise of its sample, and that of the prediction: of the samples in a window of so many.
+        A residual has the noise of its sample, and that of the prediction: of the samples in a window of so many. NaN where that is far
+        more: such a prediction says nothing of the sample.
         """
         counted = self.values > 0
         own = np.where(counted, 1 / np.where(counted, self.values, 1.0), 0.0)
@@ -80,8 +84,8 @@ class Weights:
         places, half = np.arange(own.size), length // 2
         first, end = np.maximum(places - half, 0), np.minimum(places + half + 1, own.size)
         around = (sums[end] - sums[first]) / np.maximum(there[end] - there[first], 1)
-        variance = np.maximum(own, around)
-        return np.asarray(1 / np.sqrt(np.where(variance > 0, variance, 1.0)))
+        variance = np.where(around > _MOST_AROUND * own, np.nan, np.maximum(own, around))
+        return np.asarray(1 / np.sqrt(np.where(counted, variance, 1.0)))
 
     @property
     def spread(self) -> list[float]:
