@@ -10,7 +10,7 @@ use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::MergedSession;
 use crate::identify::merged::shown::NoiseOfRows;
 use crate::identify::merged::system::{Entry, Multiplied};
-use crate::inference::missing_terms::{JudgedTerm, Missing, Suspect};
+use crate::inference::missing_terms::{Missing, Suspect};
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
 use crate::regression::problem::Correlated;
@@ -59,18 +59,7 @@ impl MergedSession<'_, '_, '_> {
             }
         }
         let rows = &self.all.rows;
-        let judged = JudgedTerm {
-            rows,
-            model: &fitted.model,
-            rhs: &rows.rhs,
-            noise: 1.0,
-            fit: &fitted.fit,
-            covariance: &noise.covariance,
-            correlated,
-            expected: noise.expected,
-            inflation: noise.inflation,
-            instructions: self.options.instructions,
-        };
+        let judged = noise.judged(rows, fitted, correlated, self.options.instructions);
         let each: Vec<usize> = (first..rows.regressors.len()).collect();
         let factors = match judged.factors(&each, &mut self.stages) {
             // Rates alone may be determined.

@@ -4,15 +4,21 @@
 //! that rest on the channels' noise alone would take what it does for knowledge, and for a change. So they rest on what is left then, by
 //! equation: every torque has another noise.
 
+use std::sync::Arc;
+
+use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::MergedSession;
 use crate::identify::weak::shown_noise::{MORE, REACHES};
+use crate::inference::missing_terms::JudgedTerm;
 use crate::inference::part_constants::NoiseFrom;
 use crate::regression::constants::Expected;
 use crate::regression::limits::NOISE_MODEL_FAILS;
+use crate::regression::problem::Correlated;
 use crate::regression::residuals::residuals;
 use crate::regression::row_covariance::RowCovariance;
+use crate::simd::instructions::Instructions;
 
 /// Where equations leave more than the noise of the channels and that may be noise, what windows follow must pay by more than chance.
 pub(crate) const SHOWN: f64 = 0.8;
@@ -34,6 +40,28 @@ impl NoiseOfRows {
             expected: fitted.expected,
             inflation: fitted.error.max(1.0),
             from: NoiseFrom::Channels,
+        }
+    }
+
+    /// What judges regressors that rows have beside those of a fit, by this noise.
+    pub(crate) fn judged<'a>(
+        &'a self,
+        rows: &'a Rows,
+        fitted: &'a MergedFit,
+        correlated: &'a Arc<Correlated>,
+        instructions: Instructions,
+    ) -> JudgedTerm<'a> {
+        JudgedTerm {
+            rows,
+            model: &fitted.model,
+            rhs: &rows.rhs,
+            noise: 1.0,
+            fit: &fitted.fit,
+            covariance: &self.covariance,
+            correlated,
+            expected: self.expected,
+            inflation: self.inflation,
+            instructions,
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::identify::merged::shown::{NoiseOfRows, SHOWN};
 use crate::identify::merged::system::Multiplied;
 use crate::identify::weak::friction::{Sliding, expected_sign};
 use crate::identify::weak::shown_noise::MORE;
-use crate::inference::missing_terms::{JudgedTerm, Missing, Suspect};
+use crate::inference::missing_terms::{Missing, Suspect};
 use crate::noise::spectrum::bridge;
 use crate::record::samples::read_around;
 use crate::regression::fit::Fit;
@@ -54,18 +54,7 @@ impl MergedSession<'_, '_, '_> {
         let first = self.all.rows.regressors.len();
         let candidates = self.candidates()?;
         let rows = &self.all.rows;
-        let judged = JudgedTerm {
-            rows,
-            model: &fitted.model,
-            rhs: &rows.rhs,
-            noise: 1.0,
-            fit: &fitted.fit,
-            covariance: &noise.covariance,
-            correlated,
-            expected: noise.expected,
-            inflation: noise.inflation,
-            instructions: self.options.instructions,
-        };
+        let judged = noise.judged(rows, fitted, correlated, self.options.instructions);
         let columns: Vec<usize> = candidates.iter().map(|one| one.column).collect();
         let factors = if columns.is_empty() { None } else { judged.factors(&columns, &mut self.stages)? };
         let told: Vec<(&PossibleTerm, Suspect)> = candidates

@@ -10,7 +10,6 @@ use crate::identify::merged::session::MergedSession;
 use crate::identify::merged::shown::NoiseOfRows;
 use crate::identify::merged::suspected_terms::sum_of_squares;
 use crate::inference::constancy::Test;
-use crate::inference::missing_terms::JudgedTerm;
 use crate::inference::part_constants::TestNoise;
 use crate::inference::short_parts::{LEFT_OF_SWINGS, Swinging, shortest, swinging};
 use crate::regression::residuals::residuals;
@@ -153,18 +152,8 @@ impl MergedSession<'_, '_, '_> {
         let first = self.all.rows.regressors.len();
         let columns: Vec<usize> = self.candidates()?.iter().map(|one| one.column).collect();
         let rows = &self.all.rows;
-        let judged = JudgedTerm {
-            rows,
-            model: &fitted.model,
-            rhs: &rows.rhs,
-            noise: 1.0,
-            fit: &fitted.fit,
-            covariance: &fitted.covariance,
-            correlated: &fitted.correlated,
-            expected: fitted.expected,
-            inflation: fitted.error.max(1.0),
-            instructions: self.options.instructions,
-        };
+        let noise = NoiseOfRows::of_channels(fitted);
+        let judged = noise.judged(rows, fitted, &fitted.correlated, self.options.instructions);
         let mut explained = 0.0;
         let beside = if columns.is_empty() { None } else { judged.beside(&columns, &mut self.stages)? };
         if let Some((problem, fit)) = beside {
