@@ -9,7 +9,6 @@ use crate::error::Error;
 use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::MergedSession;
 use crate::identify::weak::shown_noise::MORE;
-use crate::regression::residuals::residuals;
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 
 /// Mean squared error of predicting a row, over the noise's, up to which the shortest windows follow.
@@ -59,9 +58,7 @@ impl MergedSession<'_, '_, '_> {
         if fitted.model.windowed.is_empty() || self.merged.trials.len() < 2 {
             return Ok(false);
         }
-        let rows = &self.all.rows;
-        let problem = fitted.model.problem(rows, &rows.rhs, 1.0, None);
-        let (left, _) = residuals(&problem, &fitted.fit, &mut self.stages)?;
+        let (left, _) = self.left_of(fitted)?;
         Ok(self.left_in_common(fitted, &left) >= IN_COMMON)
     }
 }

@@ -26,7 +26,6 @@ use crate::regression::magnitudes::Magnitudes;
 use crate::regression::model::Model;
 use crate::regression::predictor::without_constants;
 use crate::regression::problem::Correlated;
-use crate::regression::residuals::residuals;
 use crate::regression::sandwich::joint_covariance;
 use crate::regression::solved::sensitivity;
 use crate::regression::subsample::{stretches_of_rows, thinned_rows};
@@ -292,9 +291,8 @@ impl MergedSession<'_, '_, '_> {
 
     /// What is left of the rows of every time, over the noise's standard deviation.
     fn deviation(&mut self, fitted: &MergedFit) -> Result<Vec<f64>, Error> {
+        let (left, usable) = self.left_of(fitted)?;
         let rows = &self.all.rows;
-        let problem = fitted.model.problem(rows, &rows.rhs, 1.0, None);
-        let (left, usable) = residuals(&problem, &fitted.fit, &mut self.stages)?;
         let span = fitted.fit.span.min(rows.len()).max(self.all.group);
         let mut deviation = vec![f64::NAN; rows.len()];
         // Means over the windows' length, one for every time.

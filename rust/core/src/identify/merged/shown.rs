@@ -67,15 +67,20 @@ impl NoiseOfRows {
 }
 
 impl MergedSession<'_, '_, '_> {
+    /// What a fit leaves of the rows, and which of them say something.
+    pub(crate) fn left_of(&mut self, fitted: &MergedFit) -> Result<(Vec<f64>, Vec<bool>), Error> {
+        let rows = &self.all.rows;
+        let problem = fitted.model.problem(rows, &rows.rhs, 1.0, None);
+        residuals(&problem, &fitted.fit, &mut self.stages)
+    }
+
     /// The noise of the channels, or what is left where that is more.
     pub(crate) fn noise_of_rows(&mut self, fitted: &MergedFit) -> Result<NoiseOfRows, Error> {
         let known = NoiseOfRows::of_channels(fitted);
         if fitted.error <= MORE || fitted.misfit > NOISE_MODEL_FAILS {
             return Ok(known);
         }
-        let rows = &self.all.rows;
-        let problem = fitted.model.problem(rows, &rows.rhs, 1.0, None);
-        let (left, usable) = residuals(&problem, &fitted.fit, &mut self.stages)?;
+        let (left, usable) = self.left_of(fitted)?;
         let shown = self.covariance_of(&left, &usable);
         // Windows take a part of the noise for what they follow, which rows that they do not hold show.
         let variance = shown.variance().max(fitted.error * fitted.expected.variance);

@@ -107,13 +107,6 @@ impl MergedSession<'_, '_, '_> {
         if of_motion.any(|one| leaves(one) < most) { self.swinging(fitted) } else { Ok(Vec::new()) }
     }
 
-    /// What is left of the rows, and which of them say something.
-    fn left_of(&mut self, fitted: &MergedFit) -> Result<(Vec<f64>, Vec<bool>), Error> {
-        let rows = &self.all.rows;
-        let problem = fitted.model.problem(rows, &rows.rhs, 1.0, None);
-        residuals(&problem, &fitted.fit, &mut self.stages)
-    }
-
     /// What the mean square of rows falls by, over the noise's, where an element follows lines between nodes so many times apart, all else as it is, beyond
     /// what chance explains so.
     fn explained_by_swing(
