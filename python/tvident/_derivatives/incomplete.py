@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -58,26 +58,6 @@ class Filled:
     errors: Callable[[], Array]
 
 
-# Arguments of the call, and what they are checked by.
-def incomplete_given(
-    nan_policy: str,
-    weights: npt.ArrayLike | None,
-    max_gap: int | str | None,
-    min_observations: int | None,
-    *,
-    shape: tuple[int, ...],
-    length: int,
-    period: float,
-    axis: int,
-) -> Incomplete | None:
-    """Return what is left out, as it was asked for; None where windows are to be whole."""
-    asked = nan_policy, max_gap, min_observations
-    rule = gaps_given(*asked, weighted=weights is not None, length=length, period=period)
-    if rule is None or weights is None:
-        return rule
-    return replace(rule, weights=weights_along(weights, shape, axis))
-
-
 def gaps_given(
     nan_policy: str,
     max_gap: int | str | None,
@@ -86,15 +66,16 @@ def gaps_given(
     weighted: bool,
     length: int,
     period: float,
+    weights: Array | None = None,
 ) -> Incomplete | None:
-    """Return the same before there are weights."""
+    """Return what is left out, as it was asked for; None where windows are to be whole. Weights may come later."""
     if not leaves_out(nan_policy, max_gap, min_observations, weighted=weighted):
         return None
     longest = longest_gap(max_gap, period)
     least = (length + 1) // 2
     if min_observations is not None:
         least = least_given(min_observations, length)
-    return Incomplete(nan_policy == "omit", None, length // 2 if longest is None else longest, least)
+    return Incomplete(nan_policy == "omit", weights, length // 2 if longest is None else longest, least)
 
 
 def leaves_out(nan_policy: str, max_gap: int | str | None, min_observations: int | None, *, weighted: bool) -> bool:

@@ -18,7 +18,7 @@ from tvident._derivatives.found import Found
 from tvident._derivatives.incomplete import (
     check_weighted,
     filled,
-    incomplete_given,
+    gaps_given,
     left_out,
     longest_gap,
     weights_along,
@@ -226,9 +226,9 @@ def fit_local_polynomials(
     t, seconds, times = period_or_times(y, samples, delta=delta, sample_rate=sample_rate, t=t)
     arguments.one_of("criterion", criterion, get_args(Criterion))
     arguments.one_of("selection", selection, get_args(Selection))
-    counted = None if weights is None else weights_along(weights, array.shape, axis)
+    weighed = None if weights is None else weights_along(weights, array.shape, axis)
     arguments.check_nan(
-        "y", array if counted is None else np.where(counted > 0, samples, 0), nan_policy, arguments.RowPolicy
+        "y", array if weighed is None else np.where(weighed > 0, samples, 0), nan_policy, arguments.RowPolicy
     )
     max_order = arguments.whole_number("max_order", max_order, least=0, most=HIGHEST_ORDER)
     order = None if order is None else arguments.whole_number("order", order, least=0, most=HIGHEST_ORDER)
@@ -267,11 +267,9 @@ def fit_local_polynomials(
     if times is not None:
         left = left_out_of_own_times(
             nan_policy,
-            weights,
+            weighed,
             max_gap,
             min_observations,
-            shape=array.shape,
-            axis=axis,
             window_length=window_length,
             selection=selection,
         )
@@ -307,12 +305,18 @@ def fit_local_polynomials(
     incomplete = (
         None
         if beside_gaps
-        else incomplete_given(
-            nan_policy, weights, max_gap, min_observations, shape=array.shape, length=length, period=seconds, axis=axis
+        else gaps_given(
+            nan_policy,
+            max_gap,
+            min_observations,
+            weighted=weighed is not None,
+            weights=weighed,
+            length=length,
+            period=seconds,
         )
     )
     if incomplete is not None:
-        check_weighted(automatic=automatic, weighted=weights is not None, selection=selection)
+        check_weighted(automatic=automatic, weighted=weighed is not None, selection=selection)
     if arguments.one_of("loss", loss, get_args(Loss)) == "huber":
         without = partial(left_out, longest_gap=longest_gap(max_gap, seconds)) if beside_gaps else lambda _: incomplete
         samples = robust(
@@ -321,7 +325,7 @@ def fit_local_polynomials(
             value_in(plan_of_window, without, threads),
             length,
             omit=nan_policy == "omit",
-            weights=None if incomplete is None else incomplete.weights,
+            weights=weighed,
         )
     with arguments.reporter(progress, "local polynomials") as report:
         if automatic:

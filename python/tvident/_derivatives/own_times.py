@@ -98,12 +98,10 @@ class LeftOut:
 # Arguments of the call, and what they are checked by.
 def left_out_of_own_times(
     nan_policy: str,
-    weights: npt.ArrayLike | None,
+    weights: Array | None,
     max_gap: int | str | None,
     min_observations: int | None,
     *,
-    shape: tuple[int, ...],
-    axis: int,
     window_length: int | str,
     selection: str,
 ) -> LeftOut | None:
@@ -127,8 +125,7 @@ def left_out_of_own_times(
         min_observations = incomplete.least_given(min_observations, most)
     if max_gap is not None:
         arguments.length_given("max_gap", max_gap)
-    given = None if weights is None else incomplete.weights_along(weights, shape, axis)
-    return LeftOut(nan_policy == "omit", given, max_gap, min_observations)
+    return LeftOut(nan_policy == "omit", weights, max_gap, min_observations)
 
 
 def is_automatic(window_length: int | str) -> bool:
