@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 import tvident
+from tvident._choices import Pattern
 
 Array = npt.NDArray[np.float64]
 
@@ -15,6 +16,23 @@ SEEDS = range(8)
 
 Identified = Callable[[int, bool], tuple[tvident.Identification, dict[str, float]]]
 """Identifies a record by its seed, with its weights or without, and gives the true inertia and stiffness beside it."""
+
+
+class HalfNoisy:
+    """A rig whose second half has ten times the noise in every channel, and the weights that say so."""
+
+    def __init__(self, seed: int, duration: float, pattern: Pattern) -> None:
+        self.known = tvident.simulate_torsional_rig(duration, seed=seed, pattern=pattern)
+        self._generator = np.random.default_rng(seed)
+        samples = self.known.time.size
+        self._deviation = np.where(np.arange(samples) < samples // 2, 1.0, 10.0)
+        self.weights = self._deviation**-2
+        self.angle, self.torque = self.noisy(self.known.true_angle, 1e-3), self.noisy(self.known.true_torque, 2e-2)
+
+    def noisy(self, channel: Array, level: float) -> Array:
+        """Return a channel with noise of a part of its standard deviation."""
+        noise = self._deviation * self._generator.standard_normal(channel.size)
+        return np.asarray(channel + level * np.std(channel) * noise, np.float64)
 
 
 def found_alike(one: tvident.Identification, other: tvident.Identification) -> None:

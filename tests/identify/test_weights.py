@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pytest
 
 import tvident
-from identify.half_noisy import assert_weights_help, found_alike
+from identify.half_noisy import HalfNoisy, assert_weights_help, found_alike
 
 Array = npt.NDArray[np.float64]
 
@@ -18,17 +18,8 @@ COVERED = (0.9, 0.98)
 
 def rig(seed: int, duration: float, pattern: Any = "slider") -> tuple[Any, Array, Array, Array]:
     """Give a rig whose second half has ten times the noise, with its weights."""
-    known = tvident.simulate_torsional_rig(duration, seed=seed, pattern=pattern)
-    generator = np.random.default_rng(seed)
-    samples = known.time.size
-    deviation = np.where(np.arange(samples) < samples // 2, 1.0, 10.0)
-
-    def noisy(channel: Array, level: float) -> Array:
-        return np.asarray(
-            channel + level * np.std(channel) * deviation * generator.standard_normal(samples), np.float64
-        )
-
-    return known, noisy(known.true_angle, 1e-3), noisy(known.true_torque, 2e-2), deviation**-2
+    made = HalfNoisy(seed, duration, pattern)
+    return made.known, made.angle, made.torque, made.weights
 
 
 @pytest.mark.parametrize("method", ["auto", "paper"])

@@ -5,45 +5,30 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import tvident
 from identify.closed_loop import RATE, TRUTH, closed_loop
-from identify.half_noisy import SEEDS, assert_weights_help
-
-Array = npt.NDArray[np.float64]
+from identify.half_noisy import SEEDS, HalfNoisy, assert_weights_help
 
 CONSTANT: dict[str, Any] = dict.fromkeys(("inertia", "damping", "stiffness"), "constant")
 
 
-class HalfNoisy:
-    """A rig whose second half has ten times the noise in every channel."""
-
-    def __init__(self, seed: int, duration: float = 6.0) -> None:
-        self.known = tvident.simulate_torsional_rig(duration, seed=seed, pattern="constant")
-        self._generator = np.random.default_rng(seed)
-        samples = self.known.time.size
-        self._deviation = np.where(np.arange(samples) < samples // 2, 1.0, 10.0)
-        self.weights = self._deviation**-2
-        self.angle, self.torque = self.noisy(self.known.true_angle, 1e-3), self.noisy(self.known.true_torque, 2e-2)
-        self.truth = {name: getattr(self.known, name)[0] for name in ("inertia", "stiffness")}
-
-    def noisy(self, channel: Array, level: float) -> Array:
-        """Return a channel with noise of a part of its standard deviation."""
-        noise = self._deviation * self._generator.standard_normal(channel.size)
-        return np.asarray(channel + level * np.std(channel) * noise, np.float64)
+def rig_of(seed: int) -> tuple[HalfNoisy, dict[str, float]]:
+    """Give a rig with constants, and what they are."""
+    rig = HalfNoisy(seed, 6.0, "constant")
+    return rig, {name: getattr(rig.known, name)[0] for name in ("inertia", "stiffness")}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["velocity", "acceleration"])
 def test_weights_go_with_a_derivative_that_was_measured(name: str) -> None:
     def identified(seed: int, has_weights: bool) -> tuple[tvident.Identification, dict[str, float]]:
-        rig = HalfNoisy(seed)
+        rig, truth = rig_of(seed)
         beside = {name: rig.noisy(getattr(rig.known, f"true_{name}"), 3e-3)}
         given = rig.weights if has_weights else None
         call: dict[str, Any] = {"sample_rate": 1000, "weights": given, **beside, **CONSTANT}
-        return tvident.identify(rig.angle, rig.torque, **call), rig.truth
+        return tvident.identify(rig.angle, rig.torque, **call), truth
 
     assert_weights_help(identified)
 
@@ -52,20 +37,20 @@ def test_weights_go_with_a_derivative_that_was_measured(name: str) -> None:
 @pytest.mark.parametrize("loss", ["huber", "auto"])
 def test_weights_go_with_hubers_loss(loss: Any) -> None:
     def identified(seed: int, has_weights: bool) -> tuple[tvident.Identification, dict[str, float]]:
-        rig = HalfNoisy(seed)
+        rig, truth = rig_of(seed)
         generator = np.random.default_rng(seed + 100)
         spikes = generator.choice(rig.torque.size, 30, replace=False)
         rig.torque[spikes] += 20 * np.std(rig.torque) * generator.choice([-1, 1], spikes.size)
         given = rig.weights if has_weights else None
         found = tvident.identify(rig.angle, rig.torque, sample_rate=1000, weights=given, loss=loss, **CONSTANT)
         assert found.settings["loss"] == "huber"
-        return found, rig.truth
+        return found, truth
 
     assert_weights_help(identified)
 
 
 def test_noise_that_weights_explain_is_no_heavy_tail() -> None:
-    rig = HalfNoisy(0)
+    rig, _ = rig_of(0)
     call: dict[str, Any] = {"sample_rate": 1000, "weights": rig.weights, **CONSTANT}
     found = tvident.identify(rig.angle, rig.torque, loss="auto", **call)
     assert found.settings["loss"] == "squares"
