@@ -35,3 +35,15 @@ def test_two_masses_cost_at_most_five_times_one() -> None:
     times = [(seconds(of_one), seconds(of_two)) for _ in range(3)]
     least_of_one, least_of_two = (min(each) for each in zip(*times, strict=True))
     assert least_of_two < 5 * least_of_one
+
+
+def test_four_times_as_many_trials_cost_hardly_more_than_four_times_as_much() -> None:
+    """What trials differ by was sought among the rows of all: 200 trials took 11 to 15 times as long as 50."""
+    trials = simulated(200, 500, changing, seed=5)
+
+    def of(count: int) -> float:
+        return seconds(lambda: identify(trials.angle[:count], trials.torque[:count], sample_rate=1000, ensemble_axis=0))
+
+    times = [(of(50), of(200)) for _ in range(3)]
+    least_of_few, least_of_many = (min(each) for each in zip(*times, strict=True))
+    assert least_of_many < 7 * least_of_few

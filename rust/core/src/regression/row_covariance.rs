@@ -57,6 +57,23 @@ impl RowCovariance {
         Self { lags: mean, places: (count > 1).then_some(EquationLags { count, first: 0, lags }) }
     }
 
+    /// The covariance of rows of one record, where the rows of many lie side by side: so many at every time, of which its own belong to `equations`. Rows of
+    /// others have no noise in common with them.
+    pub(crate) fn of_one_record(&self, group: usize, equations: usize) -> Self {
+        let between = |lag: usize, one: usize| {
+            let (times, other) = ((one + lag) / equations, (one + lag) % equations);
+            (times * group + other).checked_sub(one).map_or(0.0, |lag| self.at(lag, one))
+        };
+        Self::of_equations(equations, self.lags.len().div_ceil(group) * equations, between)
+    }
+
+    /// The covariance of a row of an equation with the row that comes so much later.
+    fn at(&self, lag: usize, equation: usize) -> f64 {
+        let alike = || self.lags.get(lag).copied();
+        let of_equation = |places: &EquationLags| places.lags.get(lag * places.count + equation).copied();
+        self.places.as_ref().map_or_else(alike, of_equation).unwrap_or(0.0)
+    }
+
     /// The mean over all equations.
     pub(crate) fn mean(&self) -> Self {
         Self::by_distance(self.lags.clone())
@@ -317,6 +334,34 @@ mod tests {
             for (found, column) in found.iter().zip(&columns) {
                 assert_eq!(found.to_bits(), products(column, &whole, 0).to_bits(), "{count}");
             }
+        }
+    }
+
+    #[test]
+    fn rows_of_one_record_among_many_have_the_covariance_of_its_own() {
+        let (times, records) = (40, 5);
+        for equations in [1, 2, 3] {
+            let (own, group) = (3 * equations, records * equations);
+            let between = |lag: usize, place: usize| ((lag * 7 + place * 3) as f64 * 0.9).cos() / (lag + 1) as f64;
+            let one = RowCovariance::of_equations(equations, own, between);
+            let beside = |lag: usize, place: usize| {
+                let (later, other) = ((place + lag) / group, (place + lag) % group);
+                if other < equations { between((later * equations + other).saturating_sub(place), place) } else { 0.0 }
+            };
+            let all = RowCovariance::of_equations(equations, 2 * group + equations, beside);
+            let found = all.of_one_record(group, equations);
+            let column: Vec<f64> = (0..times * equations).map(|row| (row as f64 * 0.7).sin()).collect();
+            let mut among = vec![0.0; times * group];
+            for (row, value) in column.iter().enumerate() {
+                among[row / equations * group + row % equations] = *value;
+            }
+            let of_all = all.times(&among);
+            for (row, value) in found.times(&column).iter().enumerate() {
+                let other = of_all[row / equations * group + row % equations];
+                assert!((value - other).abs() < 1e-13, "{equations}, {row}: {value} {other}");
+            }
+            assert_eq!(RowCovariance::white().of_one_record(group, equations).times(&column), column);
+            assert!((one.variance() - found.variance()).abs() < 1e-15);
         }
     }
 

@@ -37,11 +37,15 @@ impl MergedSession<'_, '_, '_> {
         }
         let rows = &self.all.rows;
         let constants = &fitted.fit.pooled.values;
+        let covariance = noise.covariance.of_one_record(group, equations);
+        // Times and equations of one trial, and where its windows end among these.
+        let (own, span) = (rows.len() / group * equations, fitted.fit.span / group * equations);
         let NoiseInProducts { columns: in_columns, torque: in_torque } = self.noise_in_products(&elements);
         for trial in 0..trials {
-            let mine = |row: &usize| row % group / equations == trial && rows.usable[*row];
-            let known = |row: &usize| tracks.iter().all(|track| track[*row].is_finite());
-            let rows: Vec<usize> = (0..rows.len()).filter(mine).filter(known).collect();
+            let of_trial = |place: usize| place / equations * group + trial * equations + place % equations;
+            let known = |row: usize| rows.usable[row] && tracks.iter().all(|track| track[row].is_finite());
+            let places: Vec<usize> = (0..own).filter(|&place| known(of_trial(place))).collect();
+            let rows: Vec<usize> = places.iter().map(|&place| of_trial(place)).collect();
             if rows.len() < ROWS_OF_AN_ELEMENT * elements.len() {
                 continue;
             }
@@ -73,14 +77,15 @@ impl MergedSession<'_, '_, '_> {
                 let noisy = solved(&of_noise);
                 let value = solved(&moments) - noisy;
                 // What every row moves the value by, and the covariance of the rows.
-                let mut moved = vec![0.0; self.all.rows.len()];
-                for &row in &rows {
-                    moved[row] = (0..size).map(|i| inverse[(place, i)] * at(i, row)).sum();
+                let mut moved = vec![0.0; own];
+                for (&own, &row) in places.iter().zip(&rows) {
+                    moved[own] = (0..size).map(|i| inverse[(place, i)] * at(i, row)).sum();
                 }
-                let mut variance = noise.inflation * quadratic(&moved, &noise.covariance);
+                let mut variance = noise.inflation * quadratic(&moved, &covariance);
                 for (&one, square) in model.windowed.iter().zip(&shared.errors).filter(|(_, square)| **square > 0.0) {
-                    let moved: Vec<f64> = moved.iter().zip(column(one)).map(|(moved, value)| moved * value).collect();
-                    variance += square * over_windows(&moved, fitted.fit.span);
+                    let of_rows = moved.iter().enumerate();
+                    let moved: Vec<f64> = of_rows.map(|(own, moved)| moved * column(one)[of_trial(own)]).collect();
+                    variance += square * over_windows(&moved, span);
                 }
                 // Weights need not be those of the angles' noise.
                 variance += if self.all.rows.roots.is_empty() { 0.0 } else { noisy * noisy };
