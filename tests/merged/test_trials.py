@@ -335,11 +335,10 @@ def test_every_trial_may_have_its_own_mask() -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2, *long(3, 4, 5, 6)])
-def test_what_changes_faster_than_windows_is_followed_by_narrower_test_functions(seed: int) -> None:
+def test_what_changes_faster_than_windows_is_followed(seed: int) -> None:
     """Test functions were chosen as if nothing changed: intervals held 42 and 48 % of what they should, K was 1.0 and 1.2 % off."""
     trials = simulated(12, 1500, lambda t: 13 + 3 * np.sin(5 * np.pi * t + seed), seed=seed)
     found = identify(trials.angle, trials.torque, **OPTIONS)
-    assert found.settings["window_length"][0] < 47
     assert not found.record_status & tvident.Status.KIND_CONTRADICTED
     # Seeds 1 to 6: .98 and more, .0061 to .0141.
     assert np.mean(np.abs(found.stiffness - trials.stiffness) < 1.96 * found.stderr["stiffness"]) > 0.9
@@ -348,20 +347,32 @@ def test_what_changes_faster_than_windows_is_followed_by_narrower_test_functions
     assert abs(value - trials.inertia) < 4 * error
 
 
+@pytest.mark.parametrize("seed", [1, *long(2, 3, 4)])
+def test_a_stiffness_of_20_hertz_is_followed_in_ten_trials(seed: int) -> None:
+    """It was 21 % off, and trusted, with words about a missing term."""
+    trials = simulated(10, 500, lambda t: 15 + 4 * np.sin(40 * np.pi * t), seed=seed)
+    found = identify(trials.angle, trials.torque, **OPTIONS)
+    off, inside = np.abs(found.stiffness - trials.stiffness), slice(50, -50)
+    assert rms(found.stiffness[inside], trials.stiffness[inside]) < 0.03
+    assert np.mean(off[inside] < 1.96 * found.stderr["stiffness"][inside]) > 0.9
+
+
 @pytest.mark.parametrize("seed", [1, *long(2, 3)])
 def test_what_no_window_follows_is_said_with_what_does(seed: int) -> None:
-    """A stiffness of 20 Hz was 21 % off in ten trials, and trusted, with words about a missing term."""
+    """A stiffness of 80 Hz was 18 to 20 % off, and trusted."""
 
     def fast(t: Array) -> Array:
-        return np.asarray(15 + 4 * np.sin(40 * np.pi * t))
+        return np.asarray(15 + 4 * np.sin(160 * np.pi * t))
 
     trials = simulated(10, 500, fast, seed=seed)
     found = identify(trials.angle, trials.torque, **OPTIONS)
     assert not found.trusted.any()
     words = "stiffness changes faster than they follow, or something acts in every trial then; functions of time have no windows"
     assert any(words in line for line in found.advice)
-    expanded = identify(trials.angle, trials.torque, **{**OPTIONS, "stiffness": tvident.Expansion("bspline")})
-    assert rms(expanded.stiffness, fast(expanded.time)) < 0.03
+    # Half a second has 40 cycles.
+    expanded = identify(trials.angle, trials.torque, **{**OPTIONS, "stiffness": tvident.Expansion("bspline", size=120)})
+    inside = slice(25, -25)
+    assert rms(expanded.stiffness[inside], fast(expanded.time)[inside]) < 0.06
 
 
 def test_what_is_late_in_every_trial_is_no_change_that_windows_miss() -> None:

@@ -116,7 +116,7 @@ class AskedTogether:
                 found = identified(noise=noise, progress=self._report_of_half(1))
             elif self.report is not None:
                 self.report(samples, samples)
-        self._check_window(asked["regression_window"], found.regression_window)
+        self._check_window(asked["regression_window"], found.regression_window, found.window_length)
         # Nothing was determined: no window was long enough.
         again = replace(self, forms=[{name: getattr(found, name) or None for name in asked}], report=None)
         chosen = [name for name, value in asked.items() if value is None]
@@ -153,9 +153,12 @@ class AskedTogether:
         return Part(found, fixed, lambda others: self._expanded(others, windows.again, wanted), chosen)
 
     @staticmethod
-    def _check_window(wanted: int | None, nearest: int) -> None:
+    def _check_window(wanted: int | None, nearest: int, test_function: int) -> None:
         """Refuse a regression window that is far from the nearest that there is, in samples; 0 where nothing is windowed."""
         if wanted is None or nearest == 0 or wanted / 2 <= nearest <= 2 * wanted:
+            return
+        if abs(wanted - nearest) <= test_function / 8:
+            # Equations lie as far apart as a test function needs: windows of one time and of one sample are the same.
             return
         bound, cure = ("at least", "more") if nearest > wanted else ("at most", "fewer")
         raise ValueError(

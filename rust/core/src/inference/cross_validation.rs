@@ -108,6 +108,11 @@ impl ComparedRows {
     /// That, and the mean squared error of every part of the rows.
     fn errors(&self, problem: &Problem<'_>, scale: Scale, fit: &Fit, variance: f64) -> (f64, Vec<f64>) {
         let Some(squared) = squared_errors(problem, scale, fit, variance) else { return (f64::NAN, Vec::new()) };
+        self.errors_of(squared)
+    }
+
+    /// The same of what predictions of rows leave, squared, over the variance of the noise, and clipped.
+    pub(crate) fn errors_of(&self, squared: impl Fn(usize) -> Option<f64>) -> (f64, Vec<f64>) {
         let [mut all, mut moving] = [(0.0, 0.0_f64); 2];
         let mut parts = [(0.0, 0.0); PARTS];
         let length = self.rows.len().div_ceil(PARTS).max(1);
@@ -243,10 +248,12 @@ fn squared_errors<'a>(
     variance: f64,
 ) -> Option<impl Fn(usize) -> Option<f64> + 'a> {
     let left = left_of_rows(problem, scale, fit)?;
-    Some(move |row: usize| {
-        let error = left(row).filter(|_| problem.usable[row])?;
-        Some((error * error / variance).min(MOST))
-    })
+    Some(move |row: usize| left(row).filter(|_| problem.usable[row]).map(|left| clipped(left, variance)))
+}
+
+/// What is left of a row, squared, over the variance of the noise, and clipped.
+pub(crate) fn clipped(left: f64, variance: f64) -> f64 {
+    (left * left / variance).min(MOST)
 }
 
 /// What predictions from the windows on both sides of a row leave of it; `None` if there are no such windows.

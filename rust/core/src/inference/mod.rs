@@ -1,5 +1,6 @@
 //! Statistical inference: cross-validation, tests of constancy, jumps, identifiability, missing terms and whether anything is explained.
 
+pub(crate) mod across_trials;
 pub(crate) mod bandwidths;
 pub(crate) mod carried_on;
 pub(crate) mod constancy;

@@ -47,7 +47,7 @@ pub(crate) struct Averages {
 }
 
 impl Averages {
-    fn new(windowed: usize, rows: usize) -> Self {
+    pub(crate) fn new(windowed: usize, rows: usize) -> Self {
         let columns = |count: usize| vec![vec![f64::NAN; rows]; count];
         Self { values: columns(windowed), slopes: columns(windowed), errors: columns(windowed) }
     }

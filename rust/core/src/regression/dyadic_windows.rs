@@ -42,7 +42,7 @@ pub(crate) struct WindowShape {
 impl WindowShape {
     /// Consecutive blocks of `step` rows.
     pub(crate) fn of(blocks: Range<usize>, step: usize) -> Self {
-        let centre = ((blocks.start + blocks.end) * step - 1) as f64 / 2.0;
+        let centre = (((blocks.start + blocks.end) * step) as f64 - 1.0) / 2.0;
         Self { parts: vec![blocks], centre }
     }
 

@@ -77,6 +77,17 @@ impl Scale {
         grouped.filter(|one| 2 * one.span() <= times * group).collect()
     }
 
+    /// Windows over some times around a row, where `group` rows belong to every time: many trials determine what they share so, and one is predicted from
+    /// the others.
+    pub(crate) fn across(times: usize, reach: usize, group: usize) -> Self {
+        Self { step: group, blocks: 0, gap: times, reach: reach * group }
+    }
+
+    /// Whether it holds only what lies between one-sided windows: these predict nothing, other trials do.
+    pub(crate) fn is_across(self) -> bool {
+        self.blocks == 0
+    }
+
     /// The fewest rows that windows of any length fit into.
     pub(crate) fn fewest_rows(reach: usize) -> usize {
         let spans = SHORT.iter().map(|&[step, blocks]| Self::new(step, blocks, reach).span());
@@ -114,6 +125,12 @@ impl Scale {
         (2 * self.one_sided()) as f64 >= fewest_rows(layout)
     }
 
+    /// The rows of a cell's full window.
+    pub(crate) fn full_window(self, cell: isize) -> Range<isize> {
+        let first = cell * self.step.cast_signed();
+        first..first + self.span().cast_signed()
+    }
+
     /// The cell that a row belongs to. Its windows need not exist.
     pub(crate) fn cell(self, row: usize) -> isize {
         (row.cast_signed() - self.first_row()).div_euclid(self.step.cast_signed())
@@ -127,8 +144,7 @@ impl Scale {
 
     /// The first row of cell 0.
     fn first_row(self) -> isize {
-        let slack = (self.gap * self.step + 2 - 2 * self.reach - self.step) / 2;
-        (self.one_sided() + self.reach + slack).cast_signed() - 1
+        (self.one_sided() + (self.gap - 1) * self.step / 2).cast_signed()
     }
 
     /// The one-sided window after the rows of a cell, given by the number of its own cell.

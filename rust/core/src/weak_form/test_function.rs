@@ -91,6 +91,12 @@ impl TestFunction {
         2 * self.half_width + 1
     }
 
+    /// The variance of times with the function as their weights, in squared samples.
+    #[must_use]
+    pub fn variance(&self) -> f64 {
+        (self.half_width as f64).powi(2) / (2.0 * self.exponent as f64 + 3.0)
+    }
+
     /// Where half the power passes, in hertz: the function is nearly a bell, `(1 - x²)^p ≈ exp(-p x²)`.
     #[must_use]
     pub fn band(&self) -> f64 {

@@ -24,6 +24,8 @@ pub(crate) struct MergedFit {
     /// The largest misfit of an equation without a torque; 1 where all are explained.
     pub(crate) misfit: f64,
     pub(crate) scales: Vec<Scale>,
+    /// Windows over fewer times that were tried, too.
+    pub(crate) across: Vec<Scale>,
     /// Lengths that were tried, in samples, and the error of each.
     pub(crate) lengths: Vec<(usize, f64)>,
     pub(crate) tests: Vec<(usize, Test)>,
@@ -37,7 +39,8 @@ pub(crate) struct MergedFit {
 impl MergedFit {
     /// Whether its windows are the shortest of those that were tried.
     pub(crate) fn has_shortest_windows(&self) -> bool {
-        self.scales.len() > 1 && self.fit.scale.is_some() && self.scales.first().copied() == self.fit.scale
+        let shortest = self.across.first().or(self.scales.first()).copied();
+        self.scales.len() > 1 && shortest.is_some() && shortest == self.fit.scale
     }
 
     /// The same decisions with the values of another fit of the model.

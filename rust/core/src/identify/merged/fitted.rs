@@ -3,6 +3,7 @@
 use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::identify::kinds::Kind;
+use crate::identify::merged::across::{best_across, growing_in};
 use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::freed::{Freed, Sought, different};
 use crate::identify::merged::session::MergedSession;
@@ -25,33 +26,27 @@ const OVERLAP: usize = 2;
 /// Rounds of looking for jumps and fitting again with windows that end there.
 const JUMP_ROUNDS: usize = 4;
 
+/// Windows that were chosen, and those that they were chosen of.
+#[derive(Default)]
+struct ChosenWindows {
+    scale: Option<Scale>,
+    /// Mean squared error of predicting a row, over the noise's.
+    error: Option<f64>,
+    /// Lengths that were tried, in samples, and the error of each.
+    lengths: Vec<(usize, f64)>,
+    scales: Vec<Scale>,
+    across: Vec<Scale>,
+}
+
 impl MergedSession<'_, '_, '_> {
     /// Fits a model in windows of the length that predicts best; `None` where the rows do not determine what is constant.
     pub(crate) fn fitted(&mut self, model: &Model) -> Result<Option<MergedFit>, Error> {
         let instructions = self.options.instructions;
-        let all = self.scales();
-        let group = self.all.group;
-        let per_row = self.all.function.stride() as f64 / group as f64;
-        let wanted = self.options.regression_window.map(|samples| samples as f64 / per_row);
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rows of a record")]
-        let wanted = wanted.map(|rows| Scale::nearest(&all, rows.round().max(1.0) as usize).ok_or(self.too_short()));
-        let tried = match wanted.transpose()? {
-            Some(one) => vec![all[one]],
-            None => self.covering(&all),
+        let model = &Model { linear: true, ..model.clone() };
+        let Some(ChosenWindows { scale, mut error, lengths, scales, across }) = self.chosen_windows(model)? else {
+            return Ok(None);
         };
-        if tried.is_empty() && !model.windowed.is_empty() {
-            return Err(self.too_short());
-        }
-        let (mut scale, mut lengths, mut error) = (None, Vec::new(), None);
-        if !model.windowed.is_empty() {
-            let validated = self.validated(model, &tried)?;
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "samples of a record")]
-            let samples = |scale: Scale| (scale.span() as f64 * per_row).round() as usize;
-            lengths = validated.iter().map(|one| (one.fit.scale.map_or(0, samples), one.error)).collect();
-            let Some(best) = best(&validated).or(validated.last()) else { return Ok(None) };
-            (scale, error) = (best.fit.scale, Some(best.error));
-            self.remember(model, &best.fit);
-        }
+        let model = &scale.map_or_else(|| model.clone(), |scale| growing_in(model, scale));
         // What noise makes of rows depends on the parameters, so a first fit gives those that the last one is made with.
         let mut fit = None;
         for _ in 0..2 {
@@ -83,13 +78,70 @@ impl MergedSession<'_, '_, '_> {
             expected,
             error,
             misfit,
-            scales: tried,
+            scales,
+            across,
             lengths,
             tests: Vec::new(),
             contradicted: false,
             jumps: Vec::new(),
             searched: false,
         }))
+    }
+
+    /// The length of windows that predicts best, or the nearest to the one that is asked for; `None` where rows determine nothing.
+    fn chosen_windows(&mut self, model: &Model) -> Result<Option<ChosenWindows>, Error> {
+        let all = self.scales();
+        if model.windowed.is_empty() {
+            let scales = self.covering(&all);
+            return Ok(Some(ChosenWindows { scales, ..ChosenWindows::default() }));
+        }
+        let across = all.first().map_or_else(Vec::new, |shortest| self.across(model, *shortest));
+        let group = self.all.group;
+        let per_row = self.all.function.stride() as f64 / group as f64;
+        let wanted = self.options.regression_window.map(|samples| samples as f64 / per_row);
+        let scales = if let Some(wanted) = wanted {
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rows of a record")]
+            let rows = wanted.round().max(1.0) as usize;
+            let each = [across.as_slice(), all.as_slice()].concat();
+            let one = each[Scale::nearest(&each, rows).ok_or(self.too_short())?];
+            if one.is_across() {
+                let compared = self.compared_across(model, (&all, all[0]), &[one])?;
+                let lengths = compared.iter().map(|found| (self.samples_in(one), found.error)).collect();
+                let error = compared.first().map(|found| found.error);
+                return Ok(Some(ChosenWindows { scale: Some(one), error, lengths, scales: all, across: Vec::new() }));
+            }
+            vec![one]
+        } else {
+            self.covering(&all)
+        };
+        if scales.is_empty() {
+            return Err(self.too_short());
+        }
+        let validated = self.validated(model, &scales)?;
+        let mut lengths: Vec<_> =
+            validated.iter().map(|one| (one.fit.scale.map_or(0, |scale| self.samples_in(scale)), one.error)).collect();
+        let Some(best) = best(&validated).or(validated.last()) else { return Ok(None) };
+        let (mut scale, mut error) = (best.fit.scale, Some(best.error));
+        self.remember(model, &best.fit);
+        let across = match all.first() {
+            Some(&shortest) if wanted.is_none() && self.has_few_times => self.across_several(model, shortest),
+            _ => Vec::new(),
+        };
+        if let Some(of_others) = scale.filter(|_| !across.is_empty()) {
+            let compared = self.compared_across(model, (&scales, of_others), &across)?;
+            lengths.splice(0..0, compared.iter().map(|one| (self.samples_in(one.scale), one.error)));
+            if let Some(best) = best_across(&compared) {
+                (scale, error) = (Some(best.scale), Some(best.error));
+            }
+        }
+        Ok(Some(ChosenWindows { scale, error, lengths, scales, across }))
+    }
+
+    /// Samples that windows hold, about: of one time, one.
+    pub(crate) fn samples_in(&self, scale: Scale) -> usize {
+        let (stride, group) = (self.all.function.stride(), self.all.group);
+        let times = scale.span() / group;
+        if scale.is_across() { (times - 1) * stride + 1 } else { times * stride }
     }
 
     /// How well windows of some lengths predict rows that were left out: on stretches of many rows as far as they hold windows so long.

@@ -1,4 +1,4 @@
-//! Narrower test functions, where windows hardly longer than one follow too slowly what all trials share.
+//! Narrower test functions, where windows hardly longer than one follow too slowly what all trials share, or the function itself blurs it.
 //!
 //! The test function is chosen as if nothing changed: for the spectrum of the angles and the noise. A window holds a test function on either side of what it
 //! predicts, so none follows what changes faster. What it leaves then is the same change in all trials, which noise is not.
@@ -24,7 +24,13 @@ impl MergedSession<'_, '_, '_> {
         if self.options.window_length.is_some() || self.options.regression_window.is_some() {
             return Ok(fitted);
         }
-        while fitted.has_shortest_windows() && fitted.error > FOLLOWS && self.is_in_common(&fitted)? {
+        loop {
+            let is_slow = fitted.has_shortest_windows() && fitted.error > FOLLOWS && self.is_in_common(&fitted)?;
+            let errors = self.squared_errors_over_few_times(&fitted)?;
+            let is_blurred = errors.is_some_and(|errors| errors.blur > errors.noise);
+            if !is_slow && !is_blurred {
+                break;
+            }
             let function = self.all.function;
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a half-width is positive")]
             let half_width = (function.half_width() as f64 / SQRT_2).round() as usize;
@@ -35,7 +41,15 @@ impl MergedSession<'_, '_, '_> {
             let decided = (self.scan.clone(), self.freed.clone(), self.is_decided);
             self.build(TestFunction::new(half_width, function.exponent(), self.options.delta)?)?;
             self.pilot()?;
-            let again = self.settle(&self.model())?.filter(|again| again.error < BETTER * fitted.error);
+            let mut again = self.settle(&self.model())?;
+            if let Some(tried) = again.take() {
+                // Narrow functions let more noise through, in which what windows do not follow is lost.
+                let is_better = match errors {
+                    Some(errors) => self.squared_errors(&tried)?.sum() < errors.sum(),
+                    None => tried.error < BETTER * fitted.error,
+                };
+                again = is_better.then_some(tried);
+            }
             let Some(again) = again else {
                 self.build(function)?;
                 (self.parameters, self.misfits, self.jumps, self.at_end) = before;

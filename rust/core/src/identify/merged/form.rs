@@ -50,6 +50,7 @@ fn identify_within(
         noise: [Vec::new(), Vec::new()],
         misfits: Vec::new(),
         is_decided: false,
+        has_few_times: false,
         freed: Vec::new(),
         colours: Vec::new(),
         parameters: merged.elements.iter().map(|element| element.known.unwrap_or(0.0)).collect(),
@@ -77,6 +78,7 @@ fn identify_within(
         let Some(again) = session.settle(&model)? else { return session.nothing() };
         fitted = again;
     }
+    let fitted = session.over_few_times(fitted)?;
     let fitted = session.follow(fitted)?;
     let (mut found, at_rows) = session.report(&fitted)?;
     let windowed = fitted.model.windowed.clone();

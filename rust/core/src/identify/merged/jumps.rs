@@ -59,7 +59,8 @@ impl MergedSession<'_, '_, '_> {
 
     /// Finds jumps of windowed elements, those that are known again.
     pub(crate) fn find_jumps(&mut self, fitted: &MergedFit) -> Result<Vec<Jump>, Error> {
-        if fitted.error > NOISE_MODEL_FAILS {
+        // Windows over few times follow what looks like a jump to others.
+        if fitted.error > NOISE_MODEL_FAILS || fitted.fit.scale.is_some_and(Scale::is_across) {
             return Ok(self.jumps.clone());
         }
         let Some(signals) = self.signals(fitted) else { return Ok(self.jumps.clone()) };

@@ -1,5 +1,7 @@
 //! Identification from rows that are merged: of repeated trials that share their parameters, and of coupled masses.
 
+pub(crate) mod across;
+pub(crate) mod blurred;
 pub(crate) mod choice;
 pub(crate) mod colour;
 pub(crate) mod decided;

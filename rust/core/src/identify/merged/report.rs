@@ -5,13 +5,16 @@ use std::sync::Arc;
 
 use crate::error::Error;
 use crate::identify::kinds::Kind;
+use crate::identify::merged::across::averages_across;
 use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::found::{FoundElement, MergedFound};
 use crate::identify::merged::lags::SuspectedChannels;
 use crate::identify::merged::session::MergedSession;
+use crate::identify::merged::shown::NoiseOfRows;
 use crate::identify::merged::suspected_terms::SuspectedTerms;
 use crate::identify::results::{RowResults, SampleResults};
 use crate::identify::scanned::Scan;
+use crate::inference::across_trials::said_across;
 use crate::inference::carried_on::far_from_equations;
 use crate::inference::constancy::{self, Test};
 use crate::inference::identifiability::is_mostly_noise;
@@ -19,7 +22,7 @@ use crate::inference::missing_terms::Missing;
 use crate::inference::part_constants::NoiseFrom;
 use crate::inference::window_averaging::{Averages, average};
 use crate::noise::median::median;
-use crate::regression::constants::{Expected, weakest};
+use crate::regression::constants::weakest;
 use crate::regression::fit::Fit;
 use crate::regression::limits::{HARDLY_TOLD_APART, NOISE_MODEL_FAILS};
 use crate::regression::magnitudes::Magnitudes;
@@ -31,6 +34,9 @@ use crate::regression::solved::sensitivity;
 use crate::regression::subsample::{stretches_of_rows, thinned_rows};
 use crate::regression::window_length::Scale;
 use crate::status::Status;
+
+/// Mean squared error of predicting a row, over the noise's, from which on windows that leave the same in all trials do not follow what these share.
+const UNFOLLOWED: f64 = 2.0;
 
 /// Flags, standard errors of windowed elements, their covariances with others, and which those are, by row.
 struct AtRows {
@@ -46,11 +52,8 @@ impl MergedSession<'_, '_, '_> {
         let (model, fit) = (&fitted.model, &fitted.fit);
         let noise = self.noise_of_rows(fitted)?;
         let inflation = noise.inflation;
+        let correlated = self.correlated_by(fitted, &noise)?;
         let rows = &self.all.rows;
-        let correlated = match noise.from {
-            NoiseFrom::Channels => Arc::clone(&fitted.correlated),
-            NoiseFrom::Equations => model.correlated(rows, &noise.covariance, &mut self.stages)?,
-        };
         let problem = model.problem(rows, &rows.rhs, 1.0, Some(&correlated));
         let covariance = fit.covariance(&problem, &noise.covariance, &mut self.stages)?;
         let mut covariance: Vec<f64> = covariance.into_iter().map(|entry| inflation * entry).collect();
@@ -61,7 +64,7 @@ impl MergedSession<'_, '_, '_> {
         }
         let weakest = weakest(&fit.full, &fit.pooled.weights);
         let mostly_noise = is_mostly_noise(&problem, rows, model, fit, &weakest, 1.0, &mut self.stages)?;
-        let averages = self.averages(fitted, &correlated, noise.expected)?;
+        let averages = self.averages(fitted, &correlated, &noise)?;
         let shared = self.left_shared(fitted, &averages);
         let AtRows { mut status, errors, covariances, pairs } =
             self.at_rows(fitted, &averages, &shared.errors, &covariance, inflation);
@@ -126,12 +129,20 @@ impl MergedSession<'_, '_, '_> {
         Ok((found, results))
     }
 
+    /// Windowed regressors of a fit times the covariance of the rows that its errors rest on.
+    pub(crate) fn correlated_by(&mut self, fitted: &MergedFit, noise: &NoiseOfRows) -> Result<Arc<Correlated>, Error> {
+        match noise.from {
+            NoiseFrom::Channels => Ok(Arc::clone(&fitted.correlated)),
+            NoiseFrom::Equations => fitted.model.correlated(&self.all.rows, &noise.covariance, &mut self.stages),
+        }
+    }
+
     /// Windowed elements at every row.
-    fn averages(
+    pub(crate) fn averages(
         &mut self,
         fitted: &MergedFit,
         correlated: &Arc<Correlated>,
-        expected: Expected,
+        noise: &NoiseOfRows,
     ) -> Result<Averages, Error> {
         let (model, fit) = (&fitted.model, &fitted.fit);
         if model.windowed.is_empty() {
@@ -142,6 +153,14 @@ impl MergedSession<'_, '_, '_> {
         let whole = model.problem(rows, &rows.rhs, 1.0, Some(correlated));
         let rhs = without_constants(&whole, constants);
         let rest = model.without_constants(rows, &whole, &rhs, constants, 1.0);
+        if let Some(scale) = fit.scale.filter(|scale| scale.is_across()) {
+            let dealt = self.dealt();
+            let covariance = noise.covariance.of_one_record(dealt.group, dealt.equations);
+            let said = said_across(&rest, scale, dealt, &covariance, &mut self.stages)?;
+            let mut averages = averages_across(&rest, fit, &said);
+            self.forget_untold(model, &fitted.scales, &mut averages);
+            return Ok(averages);
+        }
         let thinned = stretches_of_rows(rows.len()).map(|stretches| thinned_rows(rows, &stretches));
         let of_thinned = thinned.as_ref().map(|rows| model.problem(rows, &rows.rhs, 1.0, None));
         let thinned_rhs = of_thinned.as_ref().map_or_else(Vec::new, |problem| without_constants(problem, constants));
@@ -149,7 +168,7 @@ impl MergedSession<'_, '_, '_> {
             .as_ref()
             .zip(of_thinned.as_ref())
             .map(|(rows, problem)| model.without_constants(rows, problem, &thinned_rhs, constants, 1.0));
-        let judged = (expected, fit.span, 0..rows.len());
+        let judged = (noise.expected, fit.span, 0..rows.len());
         let instructions = self.options.instructions;
         let mut averages = average(&rest, of_thinned.as_ref(), &fitted.scales, judged, instructions, &mut self.stages)?;
         self.forget_untold(model, &fitted.scales, &mut averages);
@@ -217,8 +236,9 @@ impl MergedSession<'_, '_, '_> {
             }
         }
         let count = constant.len();
-        let bias: Vec<f64> =
-            self.squared_bias(fitted, averages).into_iter().zip(shared).map(|(one, other)| one.max(*other)).collect();
+        let unfollowed = self.squared_bias(fitted, averages).into_iter().zip(shared);
+        let blur = self.blur(fitted, averages);
+        let bias: Vec<f64> = unfollowed.zip(blur).map(|((one, other), blur)| one.max(*other).max(blur)).collect();
         let joint = |one: usize, other: usize, row: usize| {
             let place = fit.nearest(row);
             let later = (row as f64 - fit.centre(place)) * rows.period;
@@ -254,7 +274,7 @@ impl MergedSession<'_, '_, '_> {
         beside: [Option<Fit>; 2],
         (errors, covariance): (&[Vec<f64>], &[f64]),
     ) -> bool {
-        let is_unfollowed = found.changes_in_common && fitted.error > NOISE_MODEL_FAILS;
+        let is_unfollowed = found.changes_in_common && fitted.error > UNFOLLOWED;
         let is_other = |beside: Fit| self.are_others(fitted, &beside, errors, covariance);
         is_unfollowed || self.is_contradicted(fitted) || beside.into_iter().flatten().any(is_other)
     }
@@ -312,7 +332,8 @@ impl MergedSession<'_, '_, '_> {
     fn nothing_yet(&self, fitted: &MergedFit) -> MergedFound {
         let [_, stride] = self.all.samples();
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "samples of a record")]
-        let span = (fitted.fit.span as f64 * stride).round() as usize;
+        let of_rows = (fitted.fit.span as f64 * stride).round() as usize;
+        let span = fitted.fit.scale.map_or(of_rows, |scale| self.samples_in(scale));
         MergedFound {
             window_length: self.all.function.window_length(),
             exponent: self.all.function.exponent(),

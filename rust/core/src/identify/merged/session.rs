@@ -39,6 +39,8 @@ pub(crate) struct MergedSession<'a, 'b, 'c> {
     pub(crate) misfits: Vec<f64>,
     /// Whether nothing more is to be set free.
     pub(crate) is_decided: bool,
+    /// Whether windows may be over few times.
+    pub(crate) has_few_times: bool,
     /// Elements that are windowed although nobody asked for it, since constants leave too much.
     pub(crate) freed: Vec<usize>,
     /// The noise of every angle with its colour.
