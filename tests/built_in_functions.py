@@ -14,4 +14,5 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "preload": lambda _t, angle, _velocity: np.sign(angle),
     "gravity": lambda _t, angle, _velocity: np.sin(angle),
     "viscous_asymmetric": lambda _t, _angle, velocity: np.abs(velocity),
+    "quadratic_drag": lambda _t, _angle, velocity: velocity * np.abs(velocity),
 }

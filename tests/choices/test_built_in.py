@@ -53,7 +53,7 @@ def test_the_table_knows_what_depends_on_the_angle_and_when_it_repeats_itself() 
 
 def test_the_two_that_are_spoken_of_are_in_the_table() -> None:
     assert list(BUILT_IN)[:2] == [OFFSET, FRICTION]
-    assert [name for name, term in BUILT_IN.items() if term.dissipates] == [FRICTION]
+    assert [name for name, term in BUILT_IN.items() if term.dissipates] == [FRICTION, "quadratic_drag"]
 
 
 def test_no_other_file_names_a_term() -> None:

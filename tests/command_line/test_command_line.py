@@ -255,7 +255,7 @@ GOOD = ("--angle", "angle", "--torque", "torque", "--sample-rate", "1000")
         (
             ("identify", "FILE", *GOOD, "--term", "friction"),
             2,
-            "a term must be 'offset', 'coulomb', 'cubic', 'preload', 'gravity', 'viscous_asymmetric' or 'stribeck'",
+            "a term must be 'offset', 'coulomb', 'cubic', 'preload', 'gravity', 'viscous_asymmetric', 'quadratic_drag' or 'stribeck'",
         ),
         (("identify", "FILE", *GOOD, "--stiffness", "nonsense"), 2, "has no channel 'nonsense'"),
         (("identify", "FILE", *GOOD, "-o", "result.ods"), 2, "files that end in .csv, .npz"),

@@ -315,7 +315,7 @@ def test_the_sample_period_may_come_from_times() -> None:
         (
             {"terms": ["viscous"]},
             ValueError,
-            "a term must be 'offset', 'coulomb', 'cubic', 'preload', 'gravity', 'viscous_asymmetric' or 'stribeck'; got 'viscous'",
+            "a term must be 'offset', 'coulomb', 'cubic', 'preload', 'gravity', 'viscous_asymmetric', 'quadratic_drag' or 'stribeck'; got ",
         ),
         ({"terms": "offset"}, TypeError, r"terms must be a sequence.*write \('offset',\)"),
         ({"terms": ["offset", "offset"]}, ValueError, "'offset' comes twice"),

@@ -35,6 +35,7 @@ def record(
     growth: float = 0.0,
     asymmetry: float = 0.0,
     backlash: float = 0.0,
+    drag: float = 0.0,
 ) -> tuple[Array, Array]:
     """Give angle and torque of the rig, white noise on both; the torque comes some samples late, damping grows by a part of it.
 
@@ -58,7 +59,7 @@ def record(
 
         def acceleration(x: float, v: float, driven: float, spring: float = spring, damping: float = damping) -> float:
             # Friction is smooth below what the noise of the angle shows.
-            resisting = damping * (v + asymmetry * abs(v)) + friction * np.tanh(v / 1e-3)
+            resisting = damping * (v + asymmetry * abs(v)) + friction * np.tanh(v / 1e-3) + drag * v * abs(v)
             bent = x - min(max(x, -backlash), backlash)
             return float((driven - resisting - spring * bent - hardening * x**3) / INERTIA)
 
@@ -111,6 +112,8 @@ def resonating(seed: int, damping: float, share: float) -> tuple[Array, Array]:
         ({"friction": 0.02, "seed": 1}, "terms=['offset', 'coulomb']", "damping"),
         ({"hardening": 30.0}, "terms=['offset', 'cubic']", "stiffness"),
         ({"hardening": 300.0, "seed": 1}, "terms=['offset', 'cubic']", "inertia"),
+        ({"drag": 0.02}, "terms=['offset', 'quadratic_drag']", "damping"),
+        ({"drag": 0.1, "seed": 1}, "terms=['offset', 'quadratic_drag']", "damping"),
         ({"late": 3}, "lag=0.0030", "damping"),
     ],
     ids=lambda one: ", ".join(map(str, one.values())) if isinstance(one, dict) else None,

@@ -143,6 +143,15 @@ BUILT_IN = {
             is_sought=True,
         ),
         BuiltIn(
+            "quadratic_drag",
+            "N m s^2/rad^2",
+            "the velocity times its magnitude: the drag of a fluid",
+            "a drag of {amount} that grows as the square of the velocity seems to act",
+            lambda numpy, _, velocity: velocity * numpy.abs(velocity),
+            dissipates=True,
+            is_sought=True,
+        ),
+        BuiltIn(
             "stribeck",
             "N m",
             "exp(-(velocity/Stribeck velocity)²) times the sign of the velocity: friction that fades as motion becomes faster",

@@ -153,10 +153,10 @@ def identify(
     terms : sequence, optional
         Further terms of the left-hand side, each with an unknown factor: ``"offset"``, ``"coulomb"`` (the sign of the velocity),
         ``"cubic"`` (the cube of the angle), ``"preload"`` (the sign of the angle; negative where the spring has backlash),
-        ``"gravity"`` (the sine of the angle), ``"viscous_asymmetric"`` (the magnitude of the velocity), ``"stribeck"``
-        (exp(-(velocity/Stribeck velocity)²) times the sign of the velocity) or a :class:`Term` of your own; or a
-        pair of one of these and its kind. Without a kind a term is windowed if all unknown parameters are, and constant otherwise; an
-        offset is ``"auto"`` then in weak form: constant, and free in every window where the record says that it drifts. Beside
+        ``"gravity"`` (the sine of the angle), ``"viscous_asymmetric"`` (the magnitude of the velocity), ``"quadratic_drag"`` (the velocity
+        times its magnitude), ``"stribeck"`` (exp(-(velocity/Stribeck velocity)²) times the sign of the velocity) or a :class:`Term` of your
+        own; or a pair of one of these and its kind. Without a kind a term is windowed if all unknown parameters are, and otherwise
+        constant; an offset is ``"auto"`` then in weak form: constant, and free in every window where the record says that it drifts. Beside
         ``"coulomb"`` and ``"stribeck"`` equations that touch samples at rest do not count. The Stribeck velocity, and what a term of your
         own names in ``search=``, is found by a search, which costs 10 to 20 times as much; in a batch every record has its own.
         In weak form, where the record contradicts a constant offset beside a windowed stiffness, the angle at which the spring is relaxed

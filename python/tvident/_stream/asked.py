@@ -264,7 +264,7 @@ def _equation(request: Request) -> Equation:
         if term.own is not None or (term.inner and (is_strong or term.name not in request.needed)):
             raise ValueError(
                 f"terms of a stream must be built-in, without inner parameters; got {term.name!r}, which needs the whole record; "
-                "use 'offset', 'coulomb', 'cubic', 'preload', 'gravity' or 'viscous_asymmetric'"
+                "use 'offset', 'coulomb', 'cubic', 'preload', 'gravity', 'viscous_asymmetric' or 'quadratic_drag'"
             )
         kinds.add(term.kind)
     if not kinds:

@@ -43,7 +43,7 @@ pub struct BuiltInTerm {
 }
 
 /// Every built-in term. A new one is a row here and nothing else in the core.
-pub static BUILT_IN_TERMS: [BuiltInTerm; 6] = [
+pub static BUILT_IN_TERMS: [BuiltInTerm; 7] = [
     BuiltInTerm { name: "offset", function: TermFunction::One, smooth: true, looked_for: true, beside_torque: true },
     BuiltInTerm {
         name: "coulomb",
@@ -79,6 +79,13 @@ pub static BUILT_IN_TERMS: [BuiltInTerm; 6] = [
         smooth: false,
         looked_for: true,
         beside_torque: false,
+    },
+    BuiltInTerm {
+        name: "quadratic_drag",
+        function: TermFunction::OfVelocity(|velocity| each(velocity, |value| value * value.abs())),
+        smooth: true,
+        looked_for: true,
+        beside_torque: true,
     },
 ];
 
@@ -136,6 +143,7 @@ mod tests {
         assert_eq!(at("cubic", -3.0), -27.0);
         assert_eq!([at("preload", -3.0), at("preload", 0.0), at("preload", 0.1)], [-1.0, 0.0, 1.0]);
         assert_eq!([at("viscous_asymmetric", -3.0), at("viscous_asymmetric", 2.0)], [3.0, 2.0]);
+        assert_eq!([at("quadratic_drag", -3.0), at("quadratic_drag", 2.0)], [-9.0, 4.0]);
         assert!((at("gravity", std::f64::consts::FRAC_PI_6) - 0.5).abs() < f64::EPSILON);
     }
 
