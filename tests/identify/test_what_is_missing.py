@@ -242,6 +242,16 @@ def test_numbers_in_advice_are_those_that_the_better_equation_finds(tried: list[
 
 
 @pytest.mark.slow
+def test_what_is_nothing_beside_what_changes_is_not_named() -> None:
+    """Constants alone needed a spring that softens, by 0.095 ± 0.088 N m/rad^3 beside one that changes."""
+    angle, torque = record(1, drag=0.3)
+    first = tvident.identify(angle, torque, sample_rate=RATE).advice[0]
+    assert first.startswith("a drag of 0.299")
+    assert ": try terms=['offset', 'quadratic_drag']; then 99.99" in first
+    assert "harden" not in first
+
+
+@pytest.mark.slow
 def test_a_part_of_a_long_record_tells_what_is_missing() -> None:
     """Trials take the busiest 16 384 of 70 000 samples; the part that is at rest tells nothing."""
     angle, torque = record(5, friction=0.1, seconds=70)

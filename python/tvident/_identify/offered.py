@@ -22,6 +22,9 @@ NEXT_TO_NOTHING = 0.01
 NEARLY_ALL = 0.1
 """What explains nearly all that was left leaves at most this part of it."""
 
+_TOLD = 2.0
+"""Standard errors that a term must be away from nothing to be named: they may hold what else is suspected."""
+
 MATTERS = 0.01
 """A share of a parameter by which it must move to be told."""
 
@@ -76,6 +79,14 @@ def is_there(name: str, found: Identification) -> bool:
     else:
         value, error, *_ = found.value(name)
     return bool(abs(value) > BEYOND_CHANCE * error) and can_be(name, found)
+
+
+def is_told(name: str, found: Identification) -> bool:
+    """Return whether a term that constants alone needed is more than its error beside what changes; a lag is that of the constants."""
+    if name == "lag":
+        return True
+    value, error, *_ = found.value(name)
+    return bool(abs(value) > _TOLD * error)
 
 
 def can_be(name: str, found: Identification) -> bool:

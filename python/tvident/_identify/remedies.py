@@ -24,6 +24,7 @@ from tvident._identify.offered import (
     feeds_energy,
     holds,
     is_there,
+    is_told,
     moved,
 )
 from tvident._results import Identification
@@ -336,7 +337,7 @@ class Trial:
 
     def _compared(self, before: Call, call: Call, chosen: Sequence[str]) -> Remedy | None:
         """Return the advice in words, if it explains more of what is held back than the model at hand."""
-        found = self._identified(call)
+        found, asked = self._identified(call), call
         if call["lag"] == "auto":
             call = call | {"lag": float(f"{found.settings['lag']:.4g}")}
         is_none = not np.array_equal(call["stiffness"], before["stiffness"])  # which may be arrays without NaN
@@ -350,6 +351,13 @@ class Trial:
         best, of_best = (left, found) if is_simple else (left_free, free)
         if not (is_simple or chosen or is_none):
             return None
+        untold = [one for one in chosen if not is_told(one, of_best)]
+        if untold:
+            # Beside what changes it may be nothing.
+            without, call = (
+                one | {"terms": [term for term in one["terms"] if term not in untold]} for one in (before, asked)
+            )
+            return self._compared(without, call, [one for one in chosen if one not in untold])
         is_worth_it = best.least.share < 1 and best.ratio <= (_BETTER if is_simple else self._worth)
         if not is_worth_it or self._feeds_energy(of_best) or not all(can_be(one, of_best) for one in chosen):
             return None
