@@ -14,6 +14,7 @@ import tvident
 from parameters import long
 from tvident import Status
 from tvident._identify.improved import Improvement
+from tvident._identify.task import Task
 from tvident._results import predicted_ahead
 from tvident._results.recorded import Recorded
 from tvident._results.simulated import Simulated
@@ -282,6 +283,27 @@ def tried(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, object]]:
 
     monkeypatch.setattr(Improvement, "_identify", noted)
     return calls
+
+
+@pytest.mark.slow
+def test_channels_are_exchanged_in_vain_only_where_the_torque_takes_no_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That took up to half of a summary, and most of that of a long record."""
+    rig = tvident.simulate_torsional_rig(2.0)
+    found, exchanged = Task.found, []
+
+    def noted(self: Task, *some: Any, **call: Any) -> Any:
+        exchanged.append(np.array_equal(self._data.angles, torque))
+        return found(self, *some, **call)
+
+    monkeypatch.setattr(Task, "found", noted)
+    torque = rig.torque + 0.5 * np.sign(np.gradient(rig.angle)) * np.arange(rig.angle.size) / rig.angle.size
+    right = tvident.identify(rig.angle, torque, sample_rate=RATE)
+    assert right.advice
+    assert not any(exchanged)
+    exchanged.clear()
+    swapped = tvident.identify(torque, rig.angle, sample_rate=RATE)
+    assert swapped.advice
+    assert any(exchanged)
 
 
 @pytest.mark.slow

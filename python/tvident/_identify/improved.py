@@ -49,6 +49,9 @@ _READ = 1 << 11
 _MUCH_BETTER = 0.1
 """Swapped channels leave at most this part of what is unpredicted."""
 
+_BLOCKS = 16
+"""Blocks of a record whose work is compared."""
+
 _DOUBTED = (
     Status.TERM_SUSPECTED | Status.LAG_SUSPECTED | Status.NOISE_MODEL | Status.WINDOW_LIMIT | Status.SCALES_DISAGREE
 )
@@ -188,6 +191,24 @@ def _busiest(data: Data, length: int) -> slice:
     return slice(first, first + length)
 
 
+def _is_right(found: Identification) -> bool:
+    """Return whether inertia, damping and stiffness are positive beyond chance."""
+    return all(one.value > BEYOND_CHANCE * one.stderr for one in map(found.value, COEFFICIENTS))
+
+
+@np.errstate(all="ignore")  # of what is beyond doubles nothing is told
+def _takes_work(data: Data) -> bool:
+    """Return whether the torque does work on the motion beyond chance: with the channels exchanged damping would be negative.
+
+    The integral of the angle by the torque is that of the torque by the angle with the other sign.
+    """
+    angle, torque = (channel.astype(np.float64) for channel in (data.angles, data.torques))
+    work = torque[1:-1] * (angle[2:] - angle[:-2])
+    is_there = np.isfinite(work) if data.mask is None else np.isfinite(work) & data.mask[1:-1]
+    blocks = np.array([block.sum() for block in np.array_split(np.where(is_there, work, 0.0), _BLOCKS)])
+    return bool(blocks.mean() > BEYOND_CHANCE * blocks.std(ddof=1) / np.sqrt(_BLOCKS))
+
+
 @dataclass(frozen=True)
 class Improvement(_AskedOfRecord):
     """A single record, and how to identify it with another equation.
@@ -284,7 +305,7 @@ class Improvement(_AskedOfRecord):
         Of channels in their places exchanging gives a negative damping, however slow the motion is.
         """
         data = self.data
-        if data.motion.recorded or not all(isinstance(kind, str) for kind in self.given.values()):
+        if data.motion.recorded or not all(isinstance(kind, str) for kind in self.given.values()) or _takes_work(data):
             return None
         channels = replace(
             data, angles=data.torques, torques=data.angles, passed=data.passed[::-1], labels=None, doubts=(), step=1
@@ -296,16 +317,18 @@ class Improvement(_AskedOfRecord):
             return self.run(request, some, diagnose=False)
 
         part = self._busiest_part
+        some = channels if part is None else channels.stretch(part)
         try:
             # Where constants alone predict nothing of it nothing is swapped, and to look for all that may change there takes long.
-            if not unexplained(exchanged("constant", channels if part is None else channels.stretch(part))).share < 1:
+            if not unexplained(exchanged("constant", some)).share < 1:
                 return None
-            found = exchanged("windowed", channels)
+            found = exchanged("windowed", some)
+            if part is not None and _is_right(found):
+                found = exchanged("windowed", channels)
         except ValueError:
             return None
         left = unexplained(found).share
-        is_right = all(one.value > BEYOND_CHANCE * one.stderr for one in map(found.value, COEFFICIENTS))
-        if not (is_right and left <= NEXT_TO_NOTHING and left <= _MUCH_BETTER * unexplained(result).share):
+        if not (_is_right(found) and left <= NEXT_TO_NOTHING and left <= _MUCH_BETTER * unexplained(result).share):
             return None
         return (
             f"are the channels of angle and torque swapped? With one in the other's place inertia, damping and stiffness are positive, "
