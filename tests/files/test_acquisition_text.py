@@ -416,3 +416,27 @@ def test_files_of_instruments_that_are_damaged_or_empty_are_refused(tmp_path: Pa
         path.write_bytes(left)
         with pytest.raises(recordings.FileError, match=message):
             recordings.read(path)
+
+
+@pytest.mark.parametrize(
+    ("above", "line"),
+    [
+        ("Unit of angle: deg\nUnit of torque: Nmm\n", 2),
+        ("rig 4\n# Angle units = deg\n", 2),
+        ("Einheit Moment,Nmm\n", 1),
+        ("Unit under test: motor A\n", None),
+        ("Unit: 5\nFiltered: none\n", None),
+    ],
+)
+def test_units_in_words_above_the_names_are_not_lost_without_a_word(
+    tmp_path: Path, above: str, line: int | None
+) -> None:
+    """Degrees and N mm were taken as rad and N m: the damping was 17 times too large."""
+    path = tmp_path / "x.csv"
+    path.write_text(above + "time,angle,torque\n0,1,2\n1,3,4\n2,5,6\n")
+    found, said = read(path)
+    assert list(found) == ["time", "angle", "torque"]
+    assert ("units stand behind names, as in angle [deg]" in said) == (line is not None)
+    assert line is None or f"line {line} is not read: '" in said
+    path.write_text(above + "time [s],angle [deg],torque [Nmm]\n0,1,2\n1,3,4\n2,5,6\n")
+    assert "units stand behind names" not in read(path)[1]

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from tvident._files.cells import Separator, are_joined, is_present, is_remark, number, split, without_comment
 from tvident._files.channels import FileError, Say
 from tvident._files.names import listed, printable
-from tvident._units import is_unit, named_unit, with_unit
+from tvident._units import is_unit, named_unit, unit_of, with_unit
 
 CURE = "export the channels as columns of numbers with a point as the decimal sign"
 
@@ -35,6 +35,10 @@ _MARK = re.compile(r"\s*(?:#+|[%!]+(?=[\s\w\"])|//+)\s*")
 
 _UNITS_KEY = re.compile(r"(units?|einheit(en)?|unit[ée]s?|unidad(es)?)[. ]*[:=]?", re.IGNORECASE)
 """What may stand before units, in place of one."""
+
+_SAYS_UNIT = re.compile(r"\b(units?|einheit(en)?|unit[ée]s?|unidad(es)?)\b", re.IGNORECASE)
+_STATED = re.compile(r"[:=]")
+"""How a line says the unit of a channel in words: what it is of, a sign, and the unit."""
 
 _MOSTLY = 0.5
 """Part of a line's cells that are units which are known, where the others are units, too."""
@@ -123,11 +127,24 @@ class Names:
             line = self.above[index]
             names = line.names(self.most, self.least)
             if names:
-                return self._of_block(index, names)
+                found = self._of_block(index, names)
+                self._say_unread_units(self.above[:index], found)
+                return found
             if not line.is_comment and not said:
                 self._check_no_numbers(line)
                 said = True
         return None
+
+    def _say_unread_units(self, above: Sequence[Line], names: Sequence[str]) -> None:
+        """Say which lines above the names state units that no name has."""
+        read = {named_unit(name)[1] for name in names}
+        for line in above:
+            what, *said = (part.strip() for cell in line.cells for part in _STATED.split(cell) if part.strip())
+            if said and _SAYS_UNIT.search(what) and all(map(unit_of, said)) and not read.intersection(said):
+                text = printable(" ".join(line.cells), 60)
+                self.say(
+                    f"line {line.place} is not read: '{text}'; units stand behind names, as in angle [deg], or in a line below them"
+                )
 
     def _of_block(self, last: int, nearest: list[str]) -> list[str]:
         """Return names from the lines that have a cell for every column: names, units, types, and what is neither."""
