@@ -4,6 +4,7 @@
 //! rest friction is whatever holds the machine, anything between `-F` and `F`: equations that touch such samples say nothing of it.
 
 use std::num::NonZeroUsize;
+use std::ops::Range;
 
 use statrs::function::erf::erf;
 
@@ -31,6 +32,9 @@ const LONGER_THAN_PASSING: f64 = 10.0;
 
 /// Where less than this part of the record moves, rest is what the record is about.
 const LEAST_MOTION: f64 = 0.05;
+
+/// Samples on either side of the shortest windows in which a machine may be seen to rest.
+const LEAST_HALF: usize = 4;
 
 /// The velocity of a record as friction needs it.
 pub struct Sliding {
@@ -66,8 +70,75 @@ fn velocity_and_rest(
 ) -> Result<([Vec<f64>; 2], Vec<bool>), Error> {
     let window = 2 * half_window(angle, (delta, instructions)) + 1;
     let both = velocity(angle, window, (delta, instructions), (workers, watch))?;
-    let rests = resting(&both[0], &both[1], window, delta);
+    let mut rests = resting(&both[0], &both[1], window, delta);
+    rest_briefly(angle, &both[0], (window, delta, instructions), &mut rests);
     Ok((both, rests))
+}
+
+/// Adds rests that are shorter than the windows of the velocity, which blur their ends: slopes in the shortest windows tell them whose noise is next to nothing.
+fn rest_briefly(
+    angle: &dyn Samples,
+    velocity: &[f64],
+    (window, delta, instructions): (usize, f64, Instructions),
+    rests: &mut [bool],
+) {
+    let noise = channel_variance(angle, None, instructions).sqrt() / delta;
+    let slow = SLOW * mean_square(velocity.iter().copied()).sqrt();
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "compared with a window before")]
+    let half = match (12.0 * (WITHIN_NOISE * noise / slow).powi(2)).cbrt() / 2.0 {
+        half if half < window as f64 / 4.0 => (half.ceil() as usize).max(LEAST_HALF),
+        _ => return,
+    };
+    if 4 * half > window || rests.len() <= 2 * half {
+        return;
+    }
+    let slopes = slopes(angle, half, delta);
+    let error = noise * (12.0 / (2.0 * half as f64 + 1.0).powi(3)).sqrt();
+    for rest in runs(&resting(&slopes, &vec![error; slopes.len()], 2 * half + 1, delta)) {
+        // Slopes within half a window of its ends are those of what moves there.
+        rests[rest.start.saturating_sub(half)..(rest.end + half).min(slopes.len())].fill(true);
+    }
+    if is_all_rest(rests) {
+        rests.fill(false);
+    }
+}
+
+/// The slope of least squares around every sample; NaN within half a window of an end or of what is missing.
+fn slopes(angle: &dyn Samples, half: usize, delta: f64) -> Vec<f64> {
+    let mut samples = vec![0.0; angle.len()];
+    angle.read(0, &mut samples);
+    let scale = delta * (1..=half).map(|step| 2.0 * (step * step) as f64).sum::<f64>();
+    let slope = |centre: usize| {
+        let rise = |step: usize| step as f64 * (samples[centre + step] - samples[centre - step]);
+        (1..=half).map(rise).sum::<f64>() / scale
+    };
+    let inside = half..samples.len() - half;
+    (0..samples.len()).map(|centre| if inside.contains(&centre) { slope(centre) } else { f64::NAN }).collect()
+}
+
+/// Where samples in a row are true.
+fn runs(flags: &[bool]) -> Vec<Range<usize>> {
+    let mut found: Vec<Range<usize>> = Vec::new();
+    for place in (0..flags.len()).filter(|&place| flags[place]) {
+        match found.last_mut() {
+            Some(run) if run.end == place => run.end += 1,
+            _ => found.push(place..place + 1),
+        }
+    }
+    found
+}
+
+/// The mean square of what is finite.
+fn mean_square(values: impl Iterator<Item = f64>) -> f64 {
+    let finite = values.filter(|value| value.is_finite());
+    let (sum, count) = finite.fold((0.0, 0.0_f64), |(sum, count), value| (sum + value * value, count + 1.0));
+    sum / count.max(1.0)
+}
+
+/// Whether hardly anything moves.
+fn is_all_rest(rests: &[bool]) -> bool {
+    let moves = rests.iter().filter(|rests| !**rests).count() as f64;
+    moves < LEAST_MOTION * rests.len() as f64
 }
 
 /// What friction feels of a record.
@@ -117,17 +188,11 @@ pub(crate) fn expected_sign(velocity: f64, error: f64) -> f64 {
 
 /// Where a machine rests: its velocity is within its noise, or next to nothing, for much longer than it takes to turn round.
 fn resting(velocity: &[f64], errors: &[f64], window: usize, delta: f64) -> Vec<bool> {
-    let usable: Vec<f64> = velocity.iter().copied().filter(|velocity| velocity.is_finite()).collect();
-    let mean_square = |squares: &mut dyn Iterator<Item = f64>| {
-        let (sum, count) = squares.fold((0.0, 0.0_f64), |(sum, count), square| (sum + square, count + 1.0));
-        sum / count.max(1.0)
-    };
-    let slow = SLOW * mean_square(&mut usable.iter().map(|velocity| velocity * velocity)).sqrt();
+    let slow = SLOW * mean_square(velocity.iter().copied()).sqrt();
     let limit = |sample: usize| (WITHIN_NOISE * errors[sample]).max(slow);
     let near = |sample: usize| velocity[sample].abs() <= limit(sample);
     let moving = (1..velocity.len()).filter(|&sample| !near(sample) && velocity[sample].is_finite());
-    let mut changes = moving.map(|sample| velocity[sample] - velocity[sample - 1]).filter(|change| change.is_finite());
-    let acceleration = mean_square(&mut changes.by_ref().map(|change| change * change)).sqrt() / delta;
+    let acceleration = mean_square(moving.map(|sample| velocity[sample] - velocity[sample - 1])).sqrt() / delta;
     let mut rests = vec![false; velocity.len()];
     let mut first = 0;
     while first < velocity.len() {
@@ -143,8 +208,7 @@ fn resting(velocity: &[f64], errors: &[f64], window: usize, delta: f64) -> Vec<b
         }
         first = end;
     }
-    let moves = rests.iter().filter(|rests| !**rests).count() as f64;
-    if moves < LEAST_MOTION * rests.len() as f64 {
+    if is_all_rest(&rests) {
         rests.fill(false);
     }
     rests
@@ -223,6 +287,28 @@ mod tests {
         let rests = resting(&velocity, &vec![1e-4; 4000], 21, delta);
         assert!(rests[1000..2000].iter().all(|rests| *rests));
         assert_eq!(rests.iter().filter(|rests| **rests).count(), 1000);
+    }
+
+    #[test]
+    fn rests_that_are_shorter_than_the_windows_of_the_velocity_are_found() {
+        // Moves of 150 samples from place to place, a rest of 60 after each.
+        let place = |n: usize| {
+            let part = (n % 210).min(150) as f64 / 150.0;
+            (n / 210) as f64 + part.powi(3) * (10.0 - 15.0 * part + 6.0 * part.powi(2))
+        };
+        let encoder: Vec<f64> = (0..4200).map(|n| (place(n) * 1e4).round() / 1e4).collect();
+        let velocity: Vec<f64> = (0..4200).map(|n| (place(n + 1) - place(n)) / 0.01).collect();
+        let mut rests = vec![false; 4200];
+        rest_briefly(&encoder.as_slice(), &velocity, (201, 0.01, Instructions::current()), &mut rests);
+        let is_rest = |n: usize| n % 210 >= 150;
+        let found = (210..3990).filter(|&n| is_rest(n) && rests[n]).count();
+        assert!(found > 18 * 55, "{found}");
+        // Where it is slow besides, friction is known, but little is lost.
+        assert!((210..3990).filter(|&n| !is_rest(n) && rests[n]).count() < 18 * 30);
+        // Windows of the velocity that are as short find them themselves.
+        let mut rests = vec![false; 4200];
+        rest_briefly(&encoder.as_slice(), &velocity, (9, 0.01, Instructions::current()), &mut rests);
+        assert!(rests.iter().all(|rests| !rests));
     }
 
     #[test]
