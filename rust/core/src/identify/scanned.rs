@@ -20,6 +20,11 @@ const MARGIN: f64 = 1.5;
 pub const OTHER_CONSTANT: f64 = 4.0;
 /// The same beyond which another look is worth it.
 const IN_DOUBT: f64 = 2.0;
+/// An inertia is next to nothing below this part of what wider test functions know of it, to so many standard errors.
+const DRAWN_TO_ZERO: f64 = 0.1;
+const KNOWN: f64 = 5.0;
+/// Wider test functions that know of an inertia span at least this factor.
+const FEW_ALIKE: f64 = 1.5;
 /// From so many widths on there has to be a plateau.
 const ENOUGH_WIDTHS: usize = 6;
 
@@ -65,6 +70,34 @@ impl Scan {
     /// Looks for widths that agree, among enough of them.
     pub(crate) fn find_plateau(&mut self) {
         self.plateau = plateau(&self.scales, 0.0).filter(|_| self.scales.len() >= FEWEST_WIDTHS);
+        if let Some(wider) = self.beyond_noise() {
+            self.plateau = Some(wider);
+        }
+    }
+
+    /// The plateau of wider test functions, where narrower ones agree that next to nothing is left of an inertia that these know.
+    ///
+    /// Noise in a regressor draws its coefficient to zero. Where the noise is not white, as an encoder's ripple, no correction takes that back, and
+    /// the narrower the test functions, the more surely they agree on nothing.
+    fn beyond_noise(&self) -> Option<Plateau> {
+        let (narrow, inertia) = (self.plateau?, self.place(0)?);
+        let is_known = |one: &AtScale| one.values[inertia] > KNOWN * one.errors[inertia];
+        let beyond = narrow.last + 1;
+        let first = beyond + self.scales[beyond..].iter().position(is_known)?;
+        let alone = |one: &AtScale| AtScale {
+            values: vec![one.values[inertia]],
+            errors: vec![one.errors[inertia]],
+            ..one.clone()
+        };
+        let inertias: Vec<AtScale> = self.scales[first..].iter().map(alone).collect();
+        let known = plateau(&inertias, 0.0).filter(|known| known.factor(&inertias) >= FEW_ALIKE)?;
+        let least = inertias[known.first].values[0] * DRAWN_TO_ZERO;
+        if self.scales[narrow.first..=narrow.last].iter().any(|one| one.values[inertia].abs() >= least) {
+            return None;
+        }
+        // Narrow ones are believed no more where wide ones contradict them, though other constants of these may differ.
+        let wide = plateau(&self.scales[first..], 0.0)?;
+        Some(Plateau { first: first + wide.first, last: first + wide.last })
     }
 
     /// The part of them that estimates which agree may differ by, beside their errors.
@@ -75,7 +108,8 @@ impl Scan {
     /// Looks for widths that agree but for what matters to nobody.
     pub(crate) fn find_widths_alike(&mut self) {
         let found = Self { plateau: plateau(&self.scales, ALIKE), agreement: Agreement::Alike, ..self.clone() };
-        if self.scales.len() >= FEWEST_WIDTHS && found.factor() >= LEAST_PLATEAU {
+        let is_believed = found.factor() >= LEAST_PLATEAU && found.beyond_noise().is_none();
+        if self.scales.len() >= FEWEST_WIDTHS && is_believed {
             *self = found;
         }
     }
@@ -317,6 +351,23 @@ mod tests {
         let scans = Scans { best: with_plateau(3..=7), corrected: with_plateau(3..=7) };
         assert_eq!([64, 8, 2048].map(|half| scans.accepted(half)), [None, Some(64), Some(64)]);
         assert_eq!([64, 8, 2048].map(|half| scans.accepted_beside_windows(half)), [None, Some(64), Some(256)]);
+    }
+
+    #[test]
+    fn narrow_widths_that_noise_draws_to_nothing_give_way_to_wide_ones_that_know_the_inertia() {
+        let found = |narrow: f64, widths: usize, error: f64, unknown: usize| {
+            let mut scan = scan(1.0, error, 10);
+            for one in &mut scan.scales[..widths] {
+                (one.values[0], one.errors[0]) = (narrow, 1e-4);
+            }
+            scan.unknowns = vec![unknown];
+            scan.find_plateau();
+            scan.plateau.unwrap().first
+        };
+        assert_eq!(found(1e-3, 7, 0.05, 0), 7);
+        // An inertia that is smaller by less, one that is hardly known, one width, another constant.
+        assert_eq!([found(0.2, 7, 0.05, 0), found(1e-3, 7, 0.3, 0), found(1e-3, 9, 0.05, 0)], [0; 3]);
+        assert_eq!(found(1e-3, 7, 0.05, 1), 0);
     }
 
     #[test]
