@@ -12,8 +12,10 @@ const RUN: usize = 3;
 const FEWEST_RUNS: usize = 3;
 const FEWEST_CLIPPED: usize = 20;
 
-/// A motion that turns round or comes to rest slows down before; one that is clipped arrives with at least this part of its typical speed.
+/// A motion that turns round or comes to rest slows down before; one that is clipped arrives with at least this part of its typical speed, or jumps by so
+/// many typical changes.
 const ARRIVES: f64 = 0.2;
+const JUMPS: f64 = 2.0;
 
 /// Steps finer than the typical change by this factor show that.
 const FINE: f64 = 2.0;
@@ -186,7 +188,9 @@ fn clipped(parts: &[&[f64]], extremes: [f64; 2]) -> Option<Defect> {
                     *limit = extreme;
                     count += end - first;
                     if first >= 2 {
-                        arrivals.push((part[first - 1] - part[first - 2]).abs());
+                        let jump = (extreme - part[first - 1]).abs();
+                        let before = (part[first - 1] - part[first - 2]).abs();
+                        arrivals.push(if jump > JUMPS * typical { jump } else { before });
                     }
                 }
                 place = end;
@@ -291,6 +295,12 @@ mod tests {
         let found = of(|sample| wave(sample).min(1.0));
         let [Defect::Clipped { limits, .. }] = found[..] else { panic!("{found:?}") };
         assert_eq!(limits, [f64::NEG_INFINITY, 1.0]);
+        // A torque in steps jumps to its limits.
+        let steps = |sample: usize| 2.0 * wave(sample / 40 * 371);
+        let found = of(|sample| {
+            steps(sample).clamp(-1.5, 1.5) + 1e-3 * wave(sample * 17).min(0.0) * f64::from(steps(sample).abs() < 1.5)
+        });
+        assert!(found.iter().any(|one| matches!(one, Defect::Clipped { .. })), "{found:?}");
         let (values, mut read) = ([0.5, 1.0, -2.0, 1.5], [0.0; 3]);
         Within { channel: &values.as_slice(), limits }.read(1, &mut read);
         assert!(read[0].is_nan() && read[1] == -2.0 && read[2].is_nan(), "{read:?}");

@@ -1,12 +1,13 @@
 //! Samples that hold one and the same value in place of a reading that failed, as 0 or -999: the channel jumps there, and comes back.
 //!
 //! A torque that acts may do so as well, as one that is switched does. But then its other values repeat, or are another one after the pause, or pauses
-//! are long.
+//! are long. And a channel that is clipped stays at its extremes; but it comes near them as well, or stays at both.
 
 use std::ops::Range;
 
 use crate::error::Error;
 use crate::exec::pool::Watch;
+use crate::noise::defects::{Defect, defects};
 use crate::noise::median::median;
 use crate::noise::quantisation::quantisation_step;
 use crate::noise::walk::each_part;
@@ -25,6 +26,9 @@ const SUDDEN: f64 = 4.0;
 const FEWEST: usize = 4;
 const BACK: f64 = 0.5;
 const MOSTLY: f64 = 0.75;
+
+/// One over the part of the jumps as often as which a channel that is clipped comes to its extreme without one.
+const GRAZES: usize = 4;
 
 /// One over the part of the samples from which on a pause belongs to what the machine does.
 const SELDOM: usize = 10;
@@ -57,7 +61,9 @@ pub(crate) fn unread(channel: &dyn Samples, watch: &mut Watch<'_>) -> Result<Vec
     // A channel that was not rounded has a value twice only where it was not read.
     let is_rare = quantisation_step(channel) == 0.0;
     let (mut places, mut sudden, mut back) = (Vec::new(), 0, 0);
-    for pause in pauses(channel, value, watch)? {
+    let (pauses, [least, most]) = pauses(channel, value, watch)?;
+    let (is_extreme, count) = (value <= least || value >= most, pauses.len());
+    for pause in pauses {
         let jumps = pause.sides.map(|side| (side - value).abs());
         let is_jump = jumps.map(|jump| jump > JUMPS * usual);
         if is_jump == [true; 2] {
@@ -70,7 +76,8 @@ pub(crate) fn unread(channel: &dyn Samples, watch: &mut Watch<'_>) -> Result<Vec
     }
     let is_no_reading =
         sudden >= FEWEST && back as f64 >= MOSTLY * sudden as f64 && SELDOM * places.len() <= channel.len();
-    Ok(if is_no_reading { places } else { Vec::new() })
+    let is_clipped = || is_extreme && (count - sudden > sudden / GRAZES || stays_at_both(channel));
+    Ok(if is_no_reading && !is_clipped() { places } else { Vec::new() })
 }
 
 /// The median change from one sample to the next of those that change.
@@ -103,9 +110,16 @@ fn jumped_to(channel: &dyn Samples, jump: f64, watch: &mut Watch<'_>) -> Result<
     Ok(most.filter(|equal| equal.len() >= FEWEST).map(|equal| equal[0]))
 }
 
-/// The stretches in which a channel holds a value, that other values surround.
-fn pauses(channel: &dyn Samples, value: f64, watch: &mut Watch<'_>) -> Result<Vec<Pause>, Error> {
+/// Whether a channel is clipped at its smallest and at its largest value.
+fn stays_at_both(channel: &dyn Samples) -> bool {
+    let limits = defects(channel).iter().find_map(Defect::limits);
+    limits.is_some_and(|limits| limits.iter().all(|limit| limit.is_finite()))
+}
+
+/// The stretches in which a channel holds a value, that other values surround, and the smallest and largest of these.
+fn pauses(channel: &dyn Samples, value: f64, watch: &mut Watch<'_>) -> Result<(Vec<Pause>, [f64; 2]), Error> {
     let mut found: Vec<Pause> = Vec::new();
+    let mut extremes = [f64::INFINITY, f64::NEG_INFINITY];
     let (mut before, mut first) = (f64::NAN, None);
     each_usable(channel, watch, |place, sample| {
         if sample == value {
@@ -115,9 +129,10 @@ fn pauses(channel: &dyn Samples, value: f64, watch: &mut Watch<'_>) -> Result<Ve
         if let Some(begin) = first.take().filter(|_| is_usable(before)) {
             found.push(Pause { places: begin..place, sides: [before, sample] });
         }
+        extremes = [extremes[0].min(sample), extremes[1].max(sample)];
         before = sample;
     })?;
-    Ok(found)
+    Ok((found, extremes))
 }
 
 /// Does something with every usable sample, in order.
@@ -154,6 +169,20 @@ mod tests {
             let places = found(&channel);
             assert_eq!(places.len(), 20 * length, "{value} {length}");
             assert!(places.iter().all(|&place| channel[place] == value && (place - 300) % 371 < length));
+        }
+    }
+
+    #[test]
+    fn a_channel_that_is_clipped_was_read() {
+        // Levels of a torque, with noise.
+        let noise = uniform(SAMPLES);
+        let level = |n: usize| 4.0 * noise[n / 100 * 7 % SAMPLES];
+        let steps: Vec<f64> = (0..SAMPLES).map(|n| level(n) + 0.05 * noise[n]).collect();
+        assert_eq!(found(&steps), [0; 0]);
+        for limits in [[-1.85, 1.85], [-1.85, f64::INFINITY]] {
+            let clipped: Vec<f64> = steps.iter().map(|value| value.clamp(limits[0], limits[1])).collect();
+            assert!(clipped.contains(&limits[0]));
+            assert_eq!(found(&clipped), [0; 0], "{limits:?}");
         }
     }
 

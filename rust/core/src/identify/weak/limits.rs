@@ -1,7 +1,8 @@
 //! Whose limits a torque stays at: a drive's, which counts as any torque, or the recorder's, which hid what was beyond.
 //!
 //! Rows tell: they are predicted badly, or widths disagree, with samples at the recorder's limits, and not without them. So a record is identified with them
-//! and without. Of a long one a part is asked first, and all of it is identified without them at once where the part says so.
+//! and without. Of a long one a part is asked first, and all of it is identified without them at once where the part says so. What is constant may seem to
+//! change with them, and then nothing is predicted badly: a torque whose highest values are missing is too small, and so are inertia and damping there.
 
 use std::cell::LazyCell;
 use std::ops::Range;
@@ -38,12 +39,20 @@ pub(crate) fn identify(
         }
     }
     let whole = identify(None, None)?;
-    if !is_odd(predicted(&whole)) {
+    if !is_odd(predicted(&whole)) && freed(&whole.changing) == 0 {
         return Ok(whole);
     }
     let Some(limits) = *limits else { return Ok(whole) };
-    let within = within.map_or_else(|| identify(None, Some(limits)), Ok);
+    let within = match within.map_or_else(|| identify(None, Some(limits)), Ok) {
+        Ok(found) if freed(&found.changing) < freed(&whole.changing) && !is_odd(predicted(&found)) => return Ok(found),
+        within => within,
+    };
     better_of(whole, within, predicted).map(|(found, _)| found)
+}
+
+/// How many of inertia and damping are among the unknowns that change.
+fn freed(changing: &[usize]) -> usize {
+    changing.iter().filter(|unknown| **unknown < 2).count()
 }
 
 /// Whether a part of a record is predicted badly with samples at some limits, and better without.
