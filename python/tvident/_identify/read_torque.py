@@ -5,16 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from tvident._clocks import unheld
 from tvident._identify.data import Data
 from tvident._results import Identification
 from tvident._status import Status
 
+_AS_TRUSTED, _LEAST = 0.9, 0.5
+"""Part of the samples that must be trusted with splines: of those that are trusted with the steps of a torque, and of all."""
+
 
 def with_read_torque(data: Data, identified: Callable[[Data], Identification]) -> Data:
     """Return a record with splines between the readings of its torque, where its steps seem to come late and the splines do not.
 
-    Steps that act are no later than what they move. Those of a recorder are late by half of what it holds.
+    Steps that act are no later than what they move. Those of a recorder are late by half of what it holds. Where there is next to no noise,
+    a step between two samples seems to be off by a part of one: then splines are worse, and too little is trusted of them to tell a lag.
 
     Parameters
     ----------
@@ -25,7 +31,10 @@ def with_read_torque(data: Data, identified: Callable[[Data], Identification]) -
     if data.batch or data.motion.recorded or data.instruments is not None or not data.time.size:
         return data
     read = unheld({"torque": data.torques}, data.period, data.workers, of_torque=True)
-    if read is None or not identified(data).record_status & Status.LAG_SUSPECTED:
+    if read is None:
+        return data
+    in_steps = identified(data)
+    if not in_steps.record_status & Status.LAG_SUSPECTED:
         return data
     other = replace(
         data,
@@ -34,4 +43,7 @@ def with_read_torque(data: Data, identified: Callable[[Data], Identification]) -
         clock=read.after(data.clock),
         doubts=[*data.doubts, *((0, doubt) for doubt in read.doubts)],
     )
-    return data if identified(other).record_status & Status.LAG_SUSPECTED else other
+    between = identified(other)
+    least = max(_AS_TRUSTED * float(np.mean(in_steps.trusted)), _LEAST)
+    is_worse = float(np.mean(between.trusted)) < least
+    return data if is_worse or between.record_status & Status.LAG_SUSPECTED else other
