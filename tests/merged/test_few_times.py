@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ identify: Any = tvident.identify
 OPTIONS: dict[str, Any] = {"sample_rate": 1000, "ensemble_axis": 0}
 
 
-def sine(hertz: float) -> Any:  # noqa: ANN401 - a function of times
+def sine(hertz: float) -> Callable[[Array], Array]:
     return lambda t: np.asarray(15 + 4 * np.sin(2 * np.pi * hertz * t))
 
 

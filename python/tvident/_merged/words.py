@@ -70,8 +70,9 @@ def _unfollowed(result: Any) -> list[str]:
     """Return what to do where windows leave what all trials have in common."""
     names = [name for name, kind in result.kinds.items() if kind == "windowed"]
     what = f"{' or '.join(names)} changes faster than they follow, or something acts in every trial then"
-    cure = f"functions of time have no windows: {names[0]}=tvident.Expansion('bspline'), with a size of three for every cycle if it finds none"
-    return [f"windows leave what is the same in all trials at one time: {what}; {cure}"]
+    cure = f"functions of time have no windows: {names[0]}=tvident.Expansion('bspline')"
+    size = "with a size of three for every cycle if it finds none"
+    return [f"windows leave what is the same in all trials at one time: {what}; {cure}, {size}"]
 
 
 def _unknown(result: Any) -> list[str]:

@@ -196,6 +196,10 @@ impl MergedSession<'_, '_, '_> {
     pub(crate) fn decide(&mut self, model: &Model) -> Result<Option<MergedFit>, Error> {
         self.is_decided = false;
         let Some(mut fitted) = self.fitted(model)? else { return Ok(None) };
+        if fitted.fit.scale.is_some_and(|scale| !growing_in(&fitted.model, scale).linear) {
+            // What grows within windows of one time would be a damping that changes.
+            return Ok(Some(fitted));
+        }
         loop {
             let found = self.tests(&fitted, NoiseFrom::Channels)?;
             let mut tried = different(&found);
