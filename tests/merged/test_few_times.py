@@ -81,6 +81,22 @@ def test_samples_missing_in_all_trials_are_carried_on_and_cost_nobody_else() -> 
     assert not found.trusted[245:255].any()
 
 
+@pytest.mark.parametrize("scale", ["one", "any"])
+def test_trials_that_move_alike_keep_long_windows(scale: str) -> None:
+    """At one time they tell a stiffness apart from nothing: numbers were NaN, or 271 % off and trusted."""
+    generator = np.random.default_rng(4)
+    one = simulated(1, 500, sine(2), seed=3, angle_noise=0.0)
+    factors = np.ones((20, 1)) if scale == "one" else generator.normal(size=(20, 1))
+    angle = factors * one.angle
+    angle += 1e-3 * np.std(one.angle) * generator.standard_normal(angle.shape)
+    found = identify(
+        angle, factors * one.torque, stiffness="windowed", inertia="constant", damping="constant", **OPTIONS
+    )
+    off, error = (values[inside(500)] for values in (found.stiffness - one.stiffness, found.stderr["stiffness"]))
+    assert np.sqrt(np.mean(off**2)) / 15 < 0.05
+    assert np.mean(np.abs(off) < 1.96 * error) > 0.9
+
+
 def test_windows_over_few_times_need_many_trials() -> None:
     trials = simulated(4, 500, sine(8), seed=3)
     with pytest.raises(ValueError, match="regression_window must be at least about"):

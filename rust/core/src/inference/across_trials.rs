@@ -185,6 +185,13 @@ pub(crate) struct SaidAcross {
 
 impl SaidAcross {
     fn new(window: &WindowAcross<'_, '_>, dealt: Dealt, covariance: &RowCovariance) -> Option<Self> {
+        // Rows on one side of a gap say little of the window's centre.
+        let times = window.rows.clone().step_by(dealt.group);
+        let told =
+            times.clone().filter(|&first| window.rest.usable[first..first + dealt.group].contains(&true)).count();
+        if 2 * told <= times.len() {
+            return None;
+        }
         let all = SumsOfPart::merged(&window.sums(dealt), window.rest.layout.local());
         let (factor, moments) = all.without(None, window.rest)?;
         let inverse = factor.inverse();

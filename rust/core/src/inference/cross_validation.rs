@@ -48,16 +48,9 @@ impl Validated {
         differences.len() >= FEWEST_PARTS && mean <= AS_WELL * error
     }
 
-    /// Variances of the constants, over that of the noise of a row.
-    fn variances(&self) -> impl Iterator<Item = f64> {
-        let (fit, count) = (&self.fit, self.fit.pooled.values.len());
-        let overlap = fit.span as f64 / fit.step as f64;
-        (0..count).map(move |place| overlap * fit.pooled.inverse[place * (count + 1)])
-    }
-
     /// Whether it knows some constant far better than another length does.
     fn knows_far_better_than(&self, other: &Self) -> bool {
-        self.variances().zip(other.variances()).any(|(one, other)| one <= FAR_BETTER_KNOWN * other)
+        self.fit.variances().zip(other.fit.variances()).any(|(one, other)| one <= FAR_BETTER_KNOWN * other)
     }
 }
 

@@ -227,6 +227,13 @@ impl Fit {
         (whole + usize::from(place - whole as f64 >= 0.5)).min(self.full.len().saturating_sub(1))
     }
 
+    /// Variances of the constants, over that of the noise of a row.
+    pub(crate) fn variances(&self) -> impl Iterator<Item = f64> {
+        let count = self.pooled.values.len();
+        let overlap = self.span as f64 / self.step as f64;
+        (0..count).map(move |place| overlap * self.pooled.inverse[place * (count + 1)])
+    }
+
     /// The median of a windowed unknown over all windows.
     pub(crate) fn median(&self, unknown: usize) -> f64 {
         let mut values = self.values(unknown);

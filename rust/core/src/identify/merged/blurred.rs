@@ -43,10 +43,14 @@ impl MergedSession<'_, '_, '_> {
         let of = |values: &Vec<f64>| {
             let values: Vec<f64> = values.chunks(group).map(|time| time[time.len() / 2]).collect();
             let blur = |time: usize| {
-                let is_beside_jump = self.jumps_between((time - apart) * group, (time + apart + 1) * group);
+                let (first, last) = ((time - apart) * group, (time + apart + 1) * group);
+                let is_told = |first: usize| self.all.rows.usable[first..first + group].contains(&true);
+                if self.jumps_between(first, last) || !(first..last).step_by(group).all(is_told) {
+                    return None;
+                }
                 let [before, here, after] = [time - apart, time, time + apart].map(|time| values[time]);
                 let blur = factor * (before - 2.0 * here + after);
-                (!is_beside_jump).then_some(blur * blur).filter(|one| one.is_finite())
+                Some(blur * blur).filter(|one| one.is_finite())
             };
             let blurs: Vec<f64> = (apart..values.len().saturating_sub(apart)).filter_map(blur).collect();
             if blurs.len() < FEWEST { 0.0 } else { blurs.iter().sum::<f64>() / blurs.len() as f64 }

@@ -12,7 +12,7 @@ use crate::identify::weak::shown_noise::MORE;
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 
 /// Mean squared error of predicting a row, over the noise's, up to which the shortest windows follow.
-const FOLLOWS: f64 = 1.1;
+pub(crate) const FOLLOWS: f64 = 1.1;
 /// A narrower test function is taken only if rows are predicted so much better.
 const BETTER: f64 = 0.95;
 /// What is left along a windowed element, over what is left across it, from which on all trials have it in common.
@@ -45,7 +45,10 @@ impl MergedSession<'_, '_, '_> {
             if let Some(tried) = again.take() {
                 // Narrow functions let more noise through, in which what windows do not follow is lost.
                 let is_better = match errors {
-                    Some(errors) => self.squared_errors(&tried)?.sum() < errors.sum(),
+                    Some(errors) => {
+                        let of_tried = self.squared_errors_over_few_times(&tried)?;
+                        of_tried.is_some_and(|of_tried| of_tried.sum() < errors.sum())
+                    }
                     None => tried.error < BETTER * fitted.error,
                 };
                 again = is_better.then_some(tried);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::error::Error;
 use crate::identify::kinds::Kind;
-use crate::identify::merged::across::averages_across;
+use crate::identify::merged::across::{averages_across, bridged, has_gaps};
 use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::found::{FoundElement, MergedFound};
 use crate::identify::merged::lags::SuspectedChannels;
@@ -153,11 +153,14 @@ impl MergedSession<'_, '_, '_> {
         let whole = model.problem(rows, &rows.rhs, 1.0, Some(correlated));
         let rhs = without_constants(&whole, constants);
         let rest = model.without_constants(rows, &whole, &rhs, constants, 1.0);
+        let mut across = None;
         if let Some(scale) = fit.scale.filter(|scale| scale.is_across()) {
             let dealt = self.dealt();
             let covariance = noise.covariance.of_one_record(dealt.group, dealt.equations);
             let said = said_across(&rest, scale, dealt, &covariance, &mut self.stages)?;
-            let mut averages = averages_across(&rest, fit, &said);
+            across = Some(averages_across(&rest, fit, &said));
+        }
+        if let Some(mut averages) = across.take_if(|averages| !has_gaps(averages)) {
             self.forget_untold(model, &fitted.scales, &mut averages);
             return Ok(averages);
         }
@@ -171,6 +174,10 @@ impl MergedSession<'_, '_, '_> {
         let judged = (noise.expected, fit.span, 0..rows.len());
         let instructions = self.options.instructions;
         let mut averages = average(&rest, of_thinned.as_ref(), &fitted.scales, judged, instructions, &mut self.stages)?;
+        if let Some(across) = across {
+            // Gaps in all trials are bridged by windows on either side of them.
+            averages = bridged(across, &averages);
+        }
         self.forget_untold(model, &fitted.scales, &mut averages);
         Ok(averages)
     }

@@ -12,6 +12,7 @@ use crate::identify::weak::decide::{Predicted, better_of, is_better_within, is_o
 use crate::identify::weak::found::WeakIdentified;
 use crate::noise::defects::{Defect, defects};
 use crate::record::samples::Samples;
+use crate::status::Status;
 
 /// Samples of the part of a long record that is asked, and how many parts are looked at for the one with the most samples at the limits.
 const PART: usize = 1 << 15;
@@ -43,7 +44,10 @@ pub(crate) fn identify(
         return Ok(whole);
     }
     let Some(limits) = *limits else { return Ok(whole) };
+    let is_late = |found: &WeakIdentified| found.record_status.contains(Status::LAG_SUSPECTED);
     let within = match within.map_or_else(|| identify(None, Some(limits)), Ok) {
+        // A torque that is late with its limits and without is another matter.
+        Ok(found) if is_late(&found) && is_late(&whole) => return Ok(whole),
         Ok(found) if freed(&found.changing) < freed(&whole.changing) && !is_odd(predicted(&found)) => return Ok(found),
         within => within,
     };
