@@ -164,6 +164,16 @@ def test_overlapping_rows_are_worth_so_many_independent_ones() -> None:
     assert 2 / scatter == pytest.approx(effective_observations(3960, 41, 8), rel=0.2)
 
 
+def test_drag_is_a_default_candidate() -> None:
+    """Gravity with dry friction was best of the others, and a damping of 0.34 for 0.05."""
+    angle, torque = oscillator(4)
+    velocity = np.gradient(angle, 1e-3)
+    compared = tvident.compare_models(angle, torque + 0.05 * velocity * np.abs(velocity), sample_rate=1000, **CONSTANT)
+    assert compared.best == "quadratic_drag"
+    value, error = compared.averaged["damping"]
+    assert abs(value - 0.05) < 4 * error
+
+
 @pytest.mark.slow
 def test_default_candidates_windowed_stiffness_and_words(tmp_path: Path) -> None:
     rig = tvident.simulate_torsional_rig(duration=3.0, seed=2)
@@ -173,11 +183,11 @@ def test_default_candidates_windowed_stiffness_and_words(tmp_path: Path) -> None
     assert np.median(np.abs(value / rig.stiffness - 1)) < 0.02
     assert (error > 0).all()
     words = compared.summary()
-    assert words.splitlines()[0].startswith("8 models, ")
+    assert words.splitlines()[0].startswith("9 models, ")
     assert "best: " in words or "hardly tells" in words
     compared.save(str(tmp_path / "table.csv"))
     assert (tmp_path / "table.csv").read_text(encoding="utf-8").startswith("model,parameters,residual_std [N m],aicc,")
-    assert "ModelComparison of 8 models" in repr(compared)
+    assert "ModelComparison of 9 models" in repr(compared)
     assert compared.plot().axes[0].get_title(loc="left") == "Models compared"
     pandas = pytest.importorskip("pandas")
     assert isinstance(compared.to_pandas(), pandas.DataFrame)

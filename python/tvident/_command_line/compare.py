@@ -27,7 +27,7 @@ from tvident._command_line.options import CHANNELS, TIME
     "models",
     multiple=True,
     metavar="TERM,TERM…",
-    help=f"Terms of a candidate, of {', '.join(TERM_NAMES)}, or none; repeat it. By default eight candidates are compared.",
+    help=f"Terms of a candidate, of {', '.join(TERM_NAMES)}, or none; repeat it. By default nine candidates are compared.",
 )
 @click.option(
     "--methods",

@@ -23,6 +23,7 @@ _CANDIDATES: dict[str, dict[str, Any]] = {
     "cubic": {"terms": ("offset", "cubic")},
     "gravity": {"terms": ("offset", "gravity")},
     "coulomb": {"terms": ("offset", "coulomb")},
+    "quadratic_drag": {"terms": ("offset", "quadratic_drag")},
     "cubic, coulomb": {"terms": ("offset", "cubic", "coulomb")},
     "gravity, coulomb": {"terms": ("offset", "gravity", "coulomb")},
 }
@@ -51,7 +52,7 @@ def compare_models(
         One record, in rad and N m.
     models : mapping of str to mapping, optional
         Arguments of :func:`tvident.identify` by the model's name: ``{"spring": {"terms": ()}, "hard": {"terms": ("cubic",)}}``. By default
-        with and without damping, offset, and cubic, gravity and Coulomb terms; without gravity where the axis slides.
+        with and without damping, offset, and cubic, gravity and Coulomb terms and quadratic drag; without gravity where the axis slides.
     sample_rate : float
         Samples per second. Give exactly one of `sample_rate`, `delta` and `t`.
     delta : float
