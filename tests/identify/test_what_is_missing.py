@@ -147,6 +147,14 @@ def test_errors_hold_what_is_suspected_to_be_missing(missing: dict[str, Any], se
         assert error < true / 3, name
 
 
+@pytest.mark.parametrize("growth", [0.3, *long(1.0, 2.0)])
+def test_damping_that_grows_is_no_friction(growth: float) -> None:
+    angle, torque = record(0, growth=growth, seconds=4)
+    found = tvident.identify(angle, torque, sample_rate=RATE)
+    assert found.settings["kinds"]["damping"] == "varying"
+    assert not any("friction" in line for line in found.advice)
+
+
 @pytest.mark.parametrize(
     ("rig", "true"),
     [
@@ -156,6 +164,8 @@ def test_errors_hold_what_is_suspected_to_be_missing(missing: dict[str, Any], se
             ({"seed": 0, "friction": 0.02, "seconds": 4}, DAMPING),
             ({"seed": 1, "friction": 0.1, "seconds": 3}, DAMPING),
             ({"seed": 1, "friction": 0.05, "growth": 1.0}, 1.5 * DAMPING),
+            ({"seed": 5, "friction": 0.1, "seconds": 3}, DAMPING),
+            ({"seed": 1, "friction": 0.05, "seconds": 5}, DAMPING),
         ),
     ],
 )

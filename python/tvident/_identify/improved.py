@@ -232,7 +232,7 @@ class Improvement(_AskedOfRecord):
             exchanged = self._exchanged(result)
             remedy = remedy if exchanged is None else None
         advice, suspects = exchanged if remedy is None else remedy.words, self._suspects
-        if advice is None and (undoubted := trial.undoubted([one.name for one in self._explained.suspects])):
+        if advice is None and (undoubted := trial.undoubted(self._undoubted)):
             suspects, advice = [undoubted[0]], undoubted[1]
         if advice is None:
             # Beside other advice this comes later.
@@ -342,6 +342,12 @@ class Improvement(_AskedOfRecord):
             *(one.name for one in self.terms),
         ]
         return Explained(self.found, names, (), (), self.data.period, self.data.step, units=self.data.units)
+
+    @property
+    def _undoubted(self) -> list[str]:
+        """What may be missing where prediction tells nothing: what the core suspects, and what changes may take the place of."""
+        suspects = [one.name for one in self._explained.suspects]
+        return suspects or (self._suspects if any(one.kind == "varying" for one in self.found.unknowns) else [])
 
     @cached_property
     def _suspects(self) -> list[str]:
