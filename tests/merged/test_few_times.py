@@ -62,6 +62,15 @@ def test_what_many_trials_share_is_followed_within_a_test_function(seed: int) ->
     assert abs(value - trials.inertia) < 4 * stderr
 
 
+@pytest.mark.parametrize("seed", [3, *long(4, 5)])
+def test_errors_hold_a_step_that_is_blurred(seed: int) -> None:
+    """Where no jump was found, one mean over the record stood for what is blurred at its edge: 10 to 12 errors."""
+    trials = simulated(50, 500, lambda t: np.where(t < 0.2465, 12.0, 15.0) + np.sin(8 * np.pi * t), seed=seed)
+    found = identify(trials.angle, trials.torque, **OPTIONS)
+    off = np.abs(found.stiffness - trials.stiffness) / found.stderr["stiffness"]
+    assert np.max(off[inside(500)]) < 5
+
+
 def test_what_does_not_change_is_not_estimated_from_few_times() -> None:
     trials = simulated(50, 500, lambda t: 15 + 0 * t, seed=7)
     found = identify(trials.angle, trials.torque, stiffness="windowed", **OPTIONS)

@@ -12,6 +12,8 @@ use crate::regression::window_length::Scale;
 
 /// Times between which the second derivative is taken, in standard deviations of the weights.
 const APART: f64 = 2.0;
+/// Root mean squares of the growth from which on it is far steeper than usual.
+const STEEP: f64 = 3.0;
 /// Times at which it is known, at least.
 const FEWEST: usize = 8;
 
@@ -32,11 +34,8 @@ impl MergedSession<'_, '_, '_> {
     /// The mean squared blur of every windowed element; zero where windows are longer than a test function, whose errors hold what they bend.
     pub(crate) fn blur(&self, fitted: &MergedFit, averages: &Averages) -> Vec<f64> {
         let windowed = fitted.model.windowed.len();
-        let Some(scale) = fitted.fit.scale.filter(|scale| scale.is_across()) else { return vec![0.0; windowed] };
-        let (group, stride) = (self.all.group, self.all.function.stride() as f64);
-        let times = (scale.span() / group) as f64;
-        // That of the test function, and of rows with equal weights.
-        let variance = self.all.function.variance() / (stride * stride) + (times * times - 1.0) / 12.0;
+        let Some(variance) = self.variance_of_weights(fitted) else { return vec![0.0; windowed] };
+        let group = self.all.group;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rows of a test function")]
         let apart = (APART * variance.sqrt()).round().max(1.0) as usize;
         let factor = variance / (2 * apart * apart) as f64;
@@ -56,6 +55,27 @@ impl MergedSession<'_, '_, '_> {
             if blurs.len() < FEWEST { 0.0 } else { blurs.iter().sum::<f64>() / blurs.len() as f64 }
         };
         averages.values.iter().map(of).collect()
+    }
+
+    /// The variance of the times that windows over few times take a mean over, in squared times: that of the test function, and of rows with equal weights.
+    fn variance_of_weights(&self, fitted: &MergedFit) -> Option<f64> {
+        let scale = fitted.fit.scale.filter(|scale| scale.is_across())?;
+        let (times, stride) = ((scale.span() / self.all.group) as f64, self.all.function.stride() as f64);
+        Some(self.all.function.variance() / (stride * stride) + (times * times - 1.0) / 12.0)
+    }
+
+    /// The squared error at every row of what is far steeper there than it usually is, as at a jump that was not found: no second derivative tells it, but
+    /// it grows within a standard deviation of the weights by as much as it is off. Nothing of windows that are longer than a test function.
+    pub(crate) fn steep(&self, fitted: &MergedFit, averages: &Averages) -> Vec<Vec<f64>> {
+        let Some(variance) = self.variance_of_weights(fitted) else { return Vec::new() };
+        let seconds = variance.sqrt() * self.all.group as f64 * self.all.rows.period;
+        let of = |slopes: &Vec<f64>| {
+            let growth = |slope: &f64| if slope.is_finite() { (slope * seconds).abs() } else { 0.0 };
+            let usual =
+                STEEP * (slopes.iter().map(|slope| growth(slope).powi(2)).sum::<f64>() / slopes.len() as f64).sqrt();
+            slopes.iter().map(|slope| (growth(slope) - usual).max(0.0).powi(2)).collect()
+        };
+        averages.slopes.iter().map(of).collect()
     }
 
     /// Whether a jump lies between two rows.

@@ -244,14 +244,16 @@ impl MergedSession<'_, '_, '_> {
         }
         let count = constant.len();
         let unfollowed = self.squared_bias(fitted, averages).into_iter().zip(shared);
-        let blur = self.blur(fitted, averages);
+        let (blur, steep) = (self.blur(fitted, averages), self.steep(fitted, averages));
         let bias: Vec<f64> = unfollowed.zip(blur).map(|((one, other), blur)| one.max(*other).max(blur)).collect();
+        let off = |i: usize, row: usize| bias[i] + steep.get(i).map_or(0.0, |steep| steep[row]);
         let joint = |one: usize, other: usize, row: usize| {
             let place = fit.nearest(row);
             let later = (row as f64 - fit.centre(place)) * rows.period;
             // Averages over windows know nothing of what two windowed elements share beside the constants.
-            let own =
-                |i: usize, j: usize| if i == j { averages.errors[i][row].powi(2) * inflation + bias[i] } else { 0.0 };
+            let own = |i: usize, j: usize| {
+                if i == j { averages.errors[i][row].powi(2) * inflation + off(i, row) } else { 0.0 }
+            };
             let sensitive = |one: usize, constant: usize| sensitivity(&fit.full, place, one, constant, later);
             let between = |i: usize, j: usize| covariance[i * count + j];
             joint_covariance([one, other], [windowed.len(), count], own, sensitive, between)
