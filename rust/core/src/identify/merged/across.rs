@@ -228,10 +228,9 @@ pub(crate) fn averages_across(rest: &Problem<'_>, fit: &Fit, said: &[Option<Said
         let on = told.get(next + usize::from(place == here)).copied().filter(|(place, _)| !is_beyond_jump(*place));
         let (from, to) = (before.map_or(place, |one| one.0), on.map_or(place, |one| one.0));
         let apart = ((to - from) * fit.step) as f64 * rest.period;
-        let is_between = from < to && (place == here || from < here && here < to);
         let later = (row as f64 - fit.centre(place)) * rest.period;
         for unknown in 0..rest.layout.windowed {
-            let slope = if is_between { (value(to, unknown) - value(from, unknown)) / apart } else { 0.0 };
+            let slope = if from < to { (value(to, unknown) - value(from, unknown)) / apart } else { 0.0 };
             averages.values[unknown][row] = one.value(unknown) + later * slope;
             (averages.slopes[unknown][row], averages.errors[unknown][row]) = (slope, one.error(unknown));
         }

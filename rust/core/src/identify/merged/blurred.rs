@@ -84,7 +84,7 @@ impl MergedSession<'_, '_, '_> {
     }
 
     /// The squared errors of what is windowed.
-    pub(crate) fn squared_errors(&mut self, fitted: &MergedFit) -> Result<SquaredErrors, Error> {
+    fn squared_errors(&mut self, fitted: &MergedFit) -> Result<SquaredErrors, Error> {
         let noise = self.noise_of_rows(fitted)?;
         let correlated = self.correlated_by(fitted, &noise)?;
         let averages = self.averages(fitted, &correlated, &noise)?;

@@ -95,13 +95,13 @@ impl MergedSession<'_, '_, '_> {
             let scales = self.covering(&all);
             return Ok(Some(ChosenWindows { scales, ..ChosenWindows::default() }));
         }
-        let across = all.first().map_or_else(Vec::new, |shortest| self.across(model, *shortest));
         let group = self.all.group;
         let per_row = self.all.function.stride() as f64 / group as f64;
         let wanted = self.options.regression_window.map(|samples| samples as f64 / per_row);
         let scales = if let Some(wanted) = wanted {
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rows of a record")]
             let rows = wanted.round().max(1.0) as usize;
+            let across = all.first().map_or_else(Vec::new, |shortest| self.across(model, *shortest));
             let each = [across.as_slice(), all.as_slice()].concat();
             let one = each[Scale::nearest(&each, rows).ok_or(self.too_short())?];
             if one.is_across() {
