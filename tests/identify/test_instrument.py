@@ -48,6 +48,34 @@ def test_estimates_are_right_under_feedback_and_their_errors_hold(
     assert least <= np.mean(inside) <= most
 
 
+@pytest.mark.parametrize(
+    ("noise", "order", "window"), [(0.0, 15, 401), (0.02, 15, 401), (0.0, 3, 201)], ids=["clean", "noisy", "low order"]
+)
+def test_windows_that_smooth_the_motion_are_halved(
+    records: tuple[Array, Array, Array], noise: float, order: int, window: int
+) -> None:
+    """Nearly four periods in a window: order 15 loses more of the acceleration than errors say, order 3 most of it.
+
+    Noise of the reference must not look like lost motion: first stages of short windows would be weak.
+    """
+    scores = []
+    form = tvident.StrongForm(window_length=window, max_order=order)
+    for seed, (angle, torque, reference) in enumerate(zip(*(channel[:10] for channel in records), strict=True)):
+        # Not the seeds of the records, whose angle has that noise.
+        own = reference + noise * np.random.default_rng(5000 + seed).standard_normal(reference.size)
+        result = tvident.identify(angle, torque, sample_rate=RATE, method=form, instrument=own)
+        again = tvident.identify(angle, torque, sample_rate=RATE, settings=result.settings, instrument=own)
+        assert again.constants == result.constants
+        assert result.settings["window_length"] < window
+        for name, truth in TRUTH.items():
+            value, error = result.constants[name]
+            # 2 % is more than four standard errors.
+            assert value == pytest.approx(truth, rel=0.02)
+            scores.append((value - truth) / error)
+    # Of 30 scores, the mean square of chance is below 1 + 3 sqrt(2 / 30).
+    assert np.mean(np.square(scores)) < 1.8
+
+
 @pytest.mark.slow
 @pytest.mark.first(1)
 @pytest.mark.parametrize("every", [1, 10])

@@ -20,9 +20,14 @@ def words_with_instrument(found: _core.Identification, names: Sequence[str]) -> 
     if Status.RANK_DEFICIENT in Status(found.record_status):
         cure = "it does not move the system in as many ways as there are unknowns, or is no channel of this record"
         return Words((), (f"the instrument does not determine the unknowns: {cure}: excite more frequencies",))
-    form = "weak" if found.exponent is not None else "strong"
+    windows = f"windows of {found.window_length} samples"
+    form = (
+        f"weak form, {windows}"
+        if found.exponent is not None
+        else f"strong form, {windows}, in which polynomials follow the motion"
+    )
     how = (
-        f"two-stage least squares with the instrument, {form} form, windows of {found.window_length} samples; all unknowns are constant; "
+        f"two-stage least squares with the instrument, {form}; all unknowns are constant; "
         "standard errors from tapered sums of the residuals' scores"
     )
     reasons = [how]

@@ -99,9 +99,10 @@ class StrongForm:
     Parameters
     ----------
     window_length : int or str
-        Window of the polynomials: an odd number of samples, at least 5, or a duration such as ``"0.2 s"``.
+        Window of the polynomials: an odd number of samples, at least 5, or a duration such as ``"0.2 s"``. With an ``instrument=`` the
+        longest: windows half as long are taken while that makes the errors smaller, what polynomials smooth away among them.
     max_order : int
-        Highest candidate order, at most 15.
+        Highest candidate order, at most 15. With an ``instrument=``, the order.
     criterion : {"aicc", "aicc-textbook", "aic", "bic"}
         Criterion that chooses the order, as in :func:`tvident.fit_local_polynomials`.
     selection : {"window", "pooled", "average"}

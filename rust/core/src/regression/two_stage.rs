@@ -29,6 +29,22 @@ pub(crate) struct TwoStage {
     pub(crate) strength: f64,
 }
 
+impl TwoStage {
+    pub(crate) fn variance(&self, one: usize) -> f64 {
+        self.covariance[one * (self.values.len() + 1)]
+    }
+
+    /// Adds to the variance of one unknown.
+    pub(crate) fn widen(&mut self, one: usize, variance: f64) {
+        self.covariance[one * (self.values.len() + 1)] += variance;
+    }
+
+    /// The logarithm of the product of all variances.
+    pub(crate) fn size(&self) -> f64 {
+        (0..self.values.len()).map(|one| self.variance(one).ln()).sum()
+    }
+}
+
 /// Solves rows whose regressors are `columns`, with one instrument for each. Neighbouring rows are correlated over `reach` rows; errors are those of
 /// so many tapers.
 pub(crate) fn two_stage(

@@ -3,31 +3,27 @@
 use std::num::NonZeroUsize;
 
 use crate::equation::motion::{Motion, unknowns};
-use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::exec::pool::Watch;
-use crate::exec::stages::Stages;
 use crate::identify::identification::{Covariance, Identification, Unknown};
 use crate::identify::instrumented::constancy::tests;
 use crate::identify::instrumented::explained::explained;
-use crate::identify::instrumented::two_stage_rows::{TwoStageRows, WEAK_INSTRUMENT};
-use crate::identify::options::{Method, Options, StrongForm, Task, WeakForm};
+use crate::identify::instrumented::strong_windows::strong;
+use crate::identify::instrumented::two_stage_rows::{Both, WEAK_INSTRUMENT, columns, solve};
+use crate::identify::options::{Method, Options, Task, WeakForm};
 use crate::identify::route::of_mean_weight;
-use crate::identify::strong::rows::{differentiate, rows as strong_rows};
 use crate::identify::weak::form::with_record;
 use crate::inference::constancy::NO_CHANCE;
-use crate::local_polynomials::options::{Order, PolynomialOptions};
-use crate::local_polynomials::plan::LocalPolynomials;
 use crate::record::samples::Samples;
 use crate::regression::limits::status_of;
-use crate::regression::tapered_sums::TAPERS;
 use crate::regression::two_stage::{TwoStage, beyond};
 use crate::status::Status;
 use crate::weak_form::test_function::TestFunction;
 use crate::weak_form::weak_rows::WeakRows;
 
-/// Half-widths of test functions that are tried: from the narrowest that is right with torque held between samples, each wider by a factor.
-const NARROWEST: usize = 8;
+/// Half-widths of test functions that are tried: from the narrowest whose sums are integrals to 1e-6 of an acceleration a hundredth of the sample rate fast
+/// (8 samples took 3e-5 of an inertia), each wider by a factor.
+const NARROWEST: usize = 12;
 const WIDER: f64 = 1.4;
 
 /// Test functions that a record holds at least.
@@ -58,15 +54,6 @@ pub fn identify_with_instruments(
     tasks.iter().map(|(task, instrument)| one(task, *instrument, options, workers, watch)).collect()
 }
 
-/// Rows of both motions, with what made them.
-struct Both {
-    recorded: Rows,
-    explained: Rows,
-    reach: usize,
-    window_length: usize,
-    exponent: Option<usize>,
-}
-
 fn one(
     task: &Task<'_>,
     instrument: &dyn Samples,
@@ -85,18 +72,14 @@ fn one(
                 let both = weak(task, &explained, function, options, (workers, &mut *watch))?;
                 let found = solve(&both, &task.motion);
                 // The product of all errors; what determines nothing comes last.
-                let size = found.as_ref().map_or(f64::INFINITY, |found| {
-                    let count = found.values.len();
-                    (0..count).map(|one| found.covariance[one * (count + 1)].ln()).sum()
-                });
+                let size = found.as_ref().map_or(f64::INFINITY, TwoStage::size);
                 if best.as_ref().is_none_or(|(least, ..)| size < *least) {
                     best = Some((size, both, found));
                 }
             }
         }
         Method::Strong(form) => {
-            let both = strong(form, task, &explained, (workers, &mut *watch))?;
-            let found = solve(&both, &task.motion);
+            let (both, found) = strong(form, task, &explained, (workers, &mut *watch))?;
             best = Some((0.0, both, found));
         }
     }
@@ -154,43 +137,6 @@ fn weak(
         window_length: function.window_length(),
         exponent: Some(function.exponent()),
     })
-}
-
-fn strong(
-    form: &StrongForm<'_>,
-    task: &Task<'_>,
-    explained: &Motion<'_>,
-    (workers, watch): (NonZeroUsize, &mut Watch<'_>),
-) -> Result<Both, Error> {
-    // Orders chosen by the noise would smooth the motion away: inertia came out 2 to 3 % too large. Noise need not be smoothed, since
-    // what the instrument explains is smooth, and sums with it leave nothing else.
-    let options = form.derivatives.options();
-    let order = match options.order {
-        Order::Chosen { highest, .. } => Order::Fixed(highest.min(options.window_length.saturating_sub(2))),
-        order @ Order::Fixed(_) => order,
-    };
-    let plan = LocalPolynomials::new(PolynomialOptions { order, ..options.clone() })?;
-    let mut stages = Stages::new(workers, task.motion.angle.len(), 4, watch);
-    let mut built = Vec::new();
-    for motion in [&task.motion, explained] {
-        let lag = (task.lag.unwrap_or(0.0), form.filter_torque);
-        let differentiated = differentiate(&plan, motion, lag, &mut stages)?;
-        built.push(strong_rows(&plan, motion, (task.mask, task.weights), false, &differentiated));
-    }
-    let mut rows = built.into_iter();
-    let (recorded, explained) = (rows.next().unwrap_or_default(), rows.next().unwrap_or_default());
-    let window_length = form.derivatives.options().window_length;
-    Ok(Both { recorded, explained, reach: window_length, window_length, exponent: None })
-}
-
-/// Two-stage least squares of rows that both motions have.
-fn solve(both: &Both, motion: &Motion<'_>) -> Option<TwoStage> {
-    let columns = columns(both, motion);
-    columns.solve(0..columns.len(), (both.reach, TAPERS))
-}
-
-fn columns(both: &Both, motion: &Motion<'_>) -> TwoStageRows {
-    TwoStageRows::new(&both.recorded, &both.explained, &unknowns(&motion.coefficients, motion.terms.len()))
 }
 
 /// What was found of one record.

@@ -2,11 +2,22 @@
 
 use std::ops::Range;
 
+use crate::equation::motion::{Motion, unknowns};
 use crate::equation::rows::Rows;
+use crate::regression::tapered_sums::TAPERS;
 use crate::regression::two_stage::{TwoStage, two_stage};
 
 /// F statistic of the first stage below which estimates are biased by more than a tenth of what least squares are (Staiger, Stock 1997).
 pub const WEAK_INSTRUMENT: f64 = 10.0;
+
+/// Rows of both motions, with what made them.
+pub(crate) struct Both {
+    pub(crate) recorded: Rows,
+    pub(crate) explained: Rows,
+    pub(crate) reach: usize,
+    pub(crate) window_length: usize,
+    pub(crate) exponent: Option<usize>,
+}
 
 /// Regressors, instruments and right-hand side: zero in rows that one of the motions lacks.
 pub(crate) struct TwoStageRows {
@@ -47,10 +58,25 @@ impl TwoStageRows {
         &self.rhs
     }
 
+    /// The same rows with another right-hand side.
+    pub(crate) fn with_rhs(self, rhs: Vec<f64>) -> Self {
+        Self { rhs, ..self }
+    }
+
     /// What some of the rows say, of which neighbours are correlated over `reach`, with errors of so many tapers.
     pub(crate) fn solve(&self, rows: Range<usize>, (reach, tapers): (usize, usize)) -> Option<TwoStage> {
         let regressors: Vec<&[f64]> = self.regressors.iter().map(|column| &column[rows.clone()]).collect();
         let instruments: Vec<&[f64]> = self.instruments.iter().map(|column| &column[rows.clone()]).collect();
         two_stage(&regressors, &instruments, &self.rhs[rows], (reach, tapers))
     }
+}
+
+/// Two-stage least squares of rows that both motions have.
+pub(crate) fn solve(both: &Both, motion: &Motion<'_>) -> Option<TwoStage> {
+    let columns = columns(both, motion);
+    columns.solve(0..columns.len(), (both.reach, TAPERS))
+}
+
+pub(crate) fn columns(both: &Both, motion: &Motion<'_>) -> TwoStageRows {
+    TwoStageRows::new(&both.recorded, &both.explained, &unknowns(&motion.coefficients, motion.terms.len()))
 }
