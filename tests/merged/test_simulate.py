@@ -62,7 +62,7 @@ def test_dry_friction_of_masses_is_that_of_one_mass() -> None:
         initial=[[0.1, 0.0]],
         spans=None,
     )
-    cubic = (0, np.full(999, 3.0), lambda _time, q, _v: q**3)
+    cubic = (np.ones(1), np.full(999, 3.0), lambda _time, q, _v: q**3)
     matrices = np.array([[0.01]]), np.array([[0.01]]), np.array([[2.0]])
     moving = not_linear(matrices, 1000, 0.25, terms=[cubic])
     found, _ = moving.respond(torque, np.array([[0.1], [0.0]]), None)

@@ -187,7 +187,8 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
             workers=arguments.worker_count(options.workers),
             report=report,
         )
-        values = _Terms(terms, sampling.period, asked.workers)
+        joints = all_terms(list(dict.fromkeys(name for name, _ in getattr(options.structure, "terms", ()))), "constant")
+        values = _Terms([*joints, *terms], sampling.period, asked.workers)
         if sampling.clock is not None:
             if trials is not None:
                 return identify_trials(trials.on_grid(sampling), asked, values)

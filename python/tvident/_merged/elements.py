@@ -97,6 +97,28 @@ def on_grid(element: Element, sampling: Sampling) -> Element:
     return replace(element, value=with_channels(one, sampling.known))
 
 
+def terms_of(inside: Sequence[Element], elements: Sequence[Element]) -> list[tuple[int, str]]:
+    """Return places and names of the terms in some elements."""
+    names = {one.name for one in inside}
+    return [(entry[2], one.name) for one in elements if one.name in names for entry in one.entries if entry[1] is None]
+
+
+def renumbered(element: Element, order: Mapping[int, int]) -> Element:
+    """Return an element whose terms are counted anew."""
+    entries = tuple(
+        entry if entry[1] is not None else (*entry[:2], order[entry[2]], entry[3]) for entry in element.entries
+    )
+    return replace(element, entries=entries)
+
+
+def rewired(element: Element, places: Mapping[int, int]) -> Element:
+    """Return an element whose channels are counted anew."""
+    entries = tuple(
+        entry if entry[1] is None else (*entry[:2], places[entry[2]], entry[3]) for entry in element.entries
+    )
+    return replace(element, entries=entries)
+
+
 def kind_or_number(name: str, value: object) -> Kind | float | Expansion:
     """Return how one element comes about; None is as if nothing were said of it.
 

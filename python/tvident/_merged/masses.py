@@ -13,14 +13,14 @@ from tvident import _arguments as arguments
 from tvident._clocks import Passed
 from tvident._equation import COEFFICIENTS
 from tvident._merged.call import AskedTogether, TermValues
-from tvident._merged.elements import Element, check_expansions, kind_or_number, on_grid
+from tvident._merged.elements import Element, check_expansions, kind_or_number, on_grid, renumbered, rewired, terms_of
 from tvident._merged.mechanism import Mechanism
 from tvident._merged.merging import Merging, Part
 from tvident._merged.predicted import Equations, TrialArrays
 from tvident._merged.recorded import MergedRecorded
 from tvident._merged.result import MergedIdentification
 from tvident._merged.sampling import Sampling, check_lengths, variance_in_trials
-from tvident._merged.structure import Chain, matrices
+from tvident._merged.structure import Chain, between, matrices
 from tvident._merged.weighted import without_missing
 from tvident._units import scaled
 
@@ -87,7 +87,7 @@ class Masses:
         """
         given, place, whole = asked.parameters, 0, self
         if isinstance(self.structure, Chain):
-            found = self.structure.elements(given)
+            found, place = self.structure.elements(given), len(self.structure.terms)
         elif self.structure is None:
             found = matrices(given, self.count)
         else:
@@ -291,12 +291,12 @@ def identify_masses(trials: Sequence[Masses], asked: AskedTogether, term_values:
         inside = [one for one in inside if one.entries]
         if all(one.is_known for one in inside):
             continue
-        names = dict(_terms_of(inside, elements))
+        names = dict(terms_of(inside, elements))
         order = {place: new for new, place in enumerate(names)}
-        inside = [_renumbered(one, order) for one in inside]
+        inside = [renumbered(one, order) for one in inside]
         # The angle of every equation comes first, in their order.
         channels = [*equations, *(one for one in range(len(joined.channels)) if one not in equations)]
-        inside = [_rewired(one, {channel: place for place, channel in enumerate(channels)}) for one in inside]
+        inside = [rewired(one, {channel: place for place, channel in enumerate(channels)}) for one in inside]
         given = [_recorded(one, equations, channels, names, term_values) for one in several]
         noise = joined.noise(trials, channels, equations, asked.sampling.passed)
         is_white = joined.variances is None or bool(joined.momenta)
@@ -337,6 +337,17 @@ def _recorded(
     rows = [np.full(samples, np.nan) if one is None else np.asarray(one, np.float64) for one in torques]
     angles = np.stack([np.asarray(masses.channels[channel], np.float64) for channel in channels])
     return angles, np.stack(rows), terms, masses.mask, None, masses.weights
+
+
+def _term(masses: Masses, place: int, name: str, term_values: TermValues) -> npt.NDArray[np.float64]:
+    """Return a term of one mass, or of the motion between two, at every sample."""
+    if place < len(masses.forces):
+        return masses.forces[place]
+    if isinstance(masses.structure, Chain) and place < len(masses.structure.terms):
+        term, link = masses.structure.terms[place]
+        return term_values(term, between(link, masses.angles, masses.count))
+    term, mass = name.rsplit("_", 1)
+    return term_values(term, masses.angles[int(mass)])
 
 
 def components(equations: Sequence[int], elements: Sequence[Element]) -> list[list[int]]:
@@ -411,36 +422,6 @@ def _dependent(masses: Masses, equations: Sequence[int]) -> str | None:
                 "their equations can be added; apply independent forces, or use structure=tvident.Chain(…)"
             )
     return None
-
-
-def _terms_of(inside: Sequence[Element], elements: Sequence[Element]) -> list[tuple[int, str]]:
-    """Return places and names of the terms in some elements."""
-    names = {one.name for one in inside}
-    return [(entry[2], one.name) for one in elements if one.name in names for entry in one.entries if entry[1] is None]
-
-
-def _term(masses: Masses, place: int, name: str, term_values: TermValues) -> npt.NDArray[np.float64]:
-    """Return a term of one mass at every sample."""
-    if place < len(masses.forces):
-        return masses.forces[place]
-    term, mass = name.rsplit("_", 1)
-    return term_values(term, masses.angles[int(mass)])
-
-
-def _renumbered(element: Element, order: Mapping[int, int]) -> Element:
-    """Return an element whose terms are counted anew."""
-    entries = tuple(
-        entry if entry[1] is not None else (*entry[:2], order[entry[2]], entry[3]) for entry in element.entries
-    )
-    return replace(element, entries=entries)
-
-
-def _rewired(element: Element, places: Mapping[int, int]) -> Element:
-    """Return an element whose channels are counted anew."""
-    entries = tuple(
-        entry if entry[1] is None else (*entry[:2], places[entry[2]], entry[3]) for entry in element.entries
-    )
-    return replace(element, entries=entries)
 
 
 def _mask(mask: Any, samples: int) -> npt.NDArray[np.bool_]:

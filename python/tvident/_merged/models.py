@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident._equation import BUILT_IN, COEFFICIENTS, FRICTION, OFFSET, FixedTerm
-from tvident._merged.elements import matrix_of
+from tvident._merged.elements import Element, matrix_of
 from tvident._merged.mechanism import Mechanism, steps_of
 from tvident._merged.merging import Merging
 from tvident._merged.not_linear import General, NotLinear, TermFunction
 from tvident._merged.response import LinearMasses
-from tvident._results import Model
+from tvident._merged.structure import Link, between
+from tvident._results import Model, without_gaps
 
 Array: TypeAlias = npt.NDArray[np.float64]
+
+
+_TURNING = 0.02
+"""Part of the velocity between two masses, in the root mean square, over which dry friction between them changes its direction."""
+
+
+_ENDS = 2
+"""Of what a term acts between."""
 
 
 class Responding(Protocol):
@@ -63,19 +72,7 @@ def model_of(merging: Merging, values: Mapping[str, Array], base: Array | None) 
         )
         for of in range(len(COEFFICIENTS))
     ]
-    offsets, friction = np.zeros((2, count, samples))
-    terms: list[tuple[int, Array, TermFunction]] = []
-    for one in beside:
-        mass, along = one.entries[0][0], values[one.name]
-        if one.of == OFFSET:
-            offsets[mass] += along
-        elif one.of == FRICTION and (along >= 0).all():
-            friction[mass] += along
-        elif one.of == FRICTION:
-            # What drives, be it by chance, does not stick.
-            terms.append((mass, along, lambda _time, _q, v: np.sign(v)))
-        else:
-            terms.append((mass, along, _function(one.of, own)))
+    offsets, friction, terms = _beside(beside, values, merging, base, samples)
     shift, held = _of_base(merging, values, base)
     inertia, damping, stiffness = matrices
     if not merging.factors and not terms and not friction.any():
@@ -88,10 +85,37 @@ def model_of(merging: Merging, values: Mapping[str, Array], base: Array | None) 
     mechanism = structure if isinstance(structure, Mechanism) else None
     factors = {name: _between(values[name]) for name in ([] if mechanism is None else mechanism.names)}
     step = np.ones(count) if merging.recorded is None else steps_of(np.stack(merging.recorded.angles[0][:count]))
-    between = [(mass, _between(along), term) for mass, along, term in terms]
+    each = [(moves, _between(along), term) for moves, along, term in terms]
     at_rest = (_between(inertia), _between(damping), _between(stiffness))
-    equations = General(*at_rest, between, period, mechanism, factors, step)
+    equations = General(*at_rest, each, period, mechanism, factors, step)
     return NotLinear(equations, _between(friction), shift - offsets, held, period)
+
+
+def _beside(
+    elements: Sequence[Element], values: Mapping[str, Array], merging: Merging, base: Array | None, samples: int
+) -> tuple[Array, Array, list[tuple[Array, Array, TermFunction]]]:
+    """Return the offsets and the dry friction of every mass, and what else acts beside matrices."""
+    own = {} if merging.recorded is None else merging.recorded.own
+    offsets, friction = np.zeros((2, merging.masses, samples))
+    terms: list[tuple[Array, Array, TermFunction]] = []
+    for one in elements:
+        mass, along = one.entries[0][0], values[one.name]
+        moves = np.zeros(merging.masses)
+        for entry in one.entries:
+            moves[entry[0]] += entry[3]
+        link = _link_of(one)
+        if link is not None:
+            terms.append((moves, along, _between_masses(one.of, link, merging, base)))
+        elif one.of == OFFSET:
+            offsets[mass] += along
+        elif one.of == FRICTION and (along >= 0).all():
+            friction[mass] += along
+        elif one.of == FRICTION:
+            # What drives, be it by chance, does not stick.
+            terms.append((moves, along, lambda _time, _q, v: np.sign(v)))
+        else:
+            terms.append((moves, along, _function(one.of, own)))
+    return offsets, friction, terms
 
 
 @dataclass(frozen=True)
@@ -152,6 +176,38 @@ def _of_base(merging: Merging, values: Mapping[str, Array], base: Array | None) 
 def _between(values: Array) -> Array:
     """Return the means of neighbouring samples, along the last axis."""
     return np.asarray((values[..., 1:] + values[..., :-1]) / 2)
+
+
+def _link_of(element: Element) -> Link | None:
+    """Return what a term acts between, as its name says; None where it is of one mass."""
+    ends: list[int | Literal["base"]] = [
+        "base" if end == "base" else int(end) for end in element.name.removeprefix(f"{element.of}_").split("_")
+    ]
+    return (ends[0], ends[1]) if len(ends) == _ENDS else None
+
+
+def _between_masses(name: str, link: Link, merging: Merging, base: Array | None) -> TermFunction:
+    """Return a term of the motion of one end of a link against the other.
+
+    Dry friction slides there and does not stick: its direction changes over a part of the velocities that were recorded.
+    """
+    period = merging.sampling.period
+    function = _function(name, {})
+    if name == FRICTION:
+        if merging.recorded is None:
+            raise ValueError(
+                "the recording must be there to simulate dry friction between masses; it was not stored with the result; identify again"
+            )
+        angle = without_gaps(between(link, merging.recorded.angles[0], merging.masses)[np.newaxis])[0]
+        turning = _TURNING * float(np.std(np.gradient(angle, period))) or 1.0
+        function = lambda _time, _q, v: np.tanh(v / turning)  # noqa: E731 - as the other terms
+    if base is None or "base" not in link:
+        return function
+    moving, times, sign = base, np.arange(base.size) * period, 1.0 if link[0] == "base" else -1.0
+    rate = np.gradient(moving, period)
+    return lambda time, q, v: function(
+        time, q - sign * np.interp(time, times, moving), v - sign * np.interp(time, times, rate)
+    )
 
 
 def _function(name: str, own: Mapping[str, Any]) -> TermFunction:

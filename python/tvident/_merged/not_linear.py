@@ -52,8 +52,9 @@ class General:
     ----------
     inertia, damping, stiffness : ndarray, shape (masses, masses, n - 1)
         Between two samples.
-    terms : sequence of (int, ndarray, callable)
-        The mass, the factor between two samples, and the function of time, angle and velocity.
+    terms : sequence of (ndarray, ndarray, callable)
+        How much each mass moves in the term's motion, the factor between two samples, and the function of time and that motion's angle
+        and velocity. The term acts on each mass as much as it moves.
     period : float
     mechanism : Mechanism, optional
     factors : mapping of str to ndarray, shape (n - 1,)
@@ -65,7 +66,7 @@ class General:
     inertia: Array
     damping: Array
     stiffness: Array
-    terms: Sequence[tuple[int, Array, TermFunction]]
+    terms: Sequence[tuple[Array, Array, TermFunction]]
     period: float
     mechanism: Mechanism | None
     factors: Mapping[str, Array]
@@ -76,8 +77,8 @@ class General:
         inertia = np.broadcast_to(self.inertia[:, :, sample], (q.shape[1], *self.inertia.shape[:2]))
         rest = self.damping[:, :, sample] @ v + self.stiffness[:, :, sample] @ q
         time = np.full(q.shape[1], (sample + 0.5) * self.period)
-        for mass, factor, term in self.terms:
-            rest[mass] += factor[sample] * term(time, q[mass], v[mass])
+        for along, factor, term in self.terms:
+            rest += np.outer(along, factor[sample] * term(time, along @ q, along @ v))
         if self.mechanism is not None:
             now = {name: float(factor[sample]) for name, factor in self.factors.items()}
             moving, forces = self.mechanism.dynamics(now, q, v, self.step)
@@ -93,8 +94,8 @@ class General:
             Angles and velocities.
         """
         time: Array = (np.arange(motion[0].shape[1], dtype=np.float64) + 0.5) * self.period
-        for mass, _, term in self.terms:
-            q, v = (one[mass] for one in motion)
+        for along, _, term in self.terms:
+            q, v = (along @ one for one in motion)
             whole = term(time, q, v)
             alone = np.concatenate([term(time[at : at + 1], q[at : at + 1], v[at : at + 1]) for at in _some(time.size)])
             if np.abs(whole[_some(time.size)] - alone).max() > _SAME * np.abs(whole).max():

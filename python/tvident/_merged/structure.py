@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._equation import COEFFICIENTS
+from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET
 from tvident._expansion import Expansion
 from tvident._merged.elements import Element, Entry, kind_or_number, unmentioned
 
@@ -19,6 +19,9 @@ Link: TypeAlias = tuple[int | Literal["base"], int | Literal["base"]]
 """Two masses, or a mass and the base."""
 
 _LEAST_PAIR = 2
+
+JOINT_TERMS = tuple(name for name, one in BUILT_IN.items() if name != OFFSET and not one.inner)
+"""What may act between two masses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +41,16 @@ class Chain:
     base : array_like, shape (n,), optional
         Motion of the base, in the unit of the angle unless it says its own (:class:`Channel`): a road, a motor's shaft. By default it
         does not move. Of several trials one row or array for each.
+    terms : sequence of (str, (int or "base", int or "base")), optional
+        Built-in terms of the motion between two masses, or a mass and the base: ``("coulomb", (0, 1))`` is dry friction in their joint,
+        ``("cubic", ("base", 0))`` a spring that hardens. Their factors are constant. A term acts on the second of the two, as a function
+        of the second's motion against the first, and back on the first.
 
     Raises
     ------
     ValueError
-        If there is no mass or no spring, a spring connects a mass to itself or to one that is not there, or two connect the same.
+        If there is no mass or no spring, a spring connects a mass to itself or to one that is not there, two connect the same, or a term
+        is unknown or comes twice.
     TypeError
         If a number is not whole.
 
@@ -72,6 +80,7 @@ class Chain:
     springs: Sequence[Link]
     dampers: Sequence[Link] | None = None
     base: npt.ArrayLike | Sequence[npt.ArrayLike] | None = field(default=None, repr=False)
+    terms: Sequence[tuple[str, Link]] = ()
 
     def __post_init__(self) -> None:
         masses = arguments.whole_number("masses", self.masses, least=1)
@@ -81,10 +90,11 @@ class Chain:
             raise ValueError("a chain must have a spring; got springs=[]; give pairs such as ('base', 0)")
         dampers = self.springs if self.dampers is None else _links("dampers", self.dampers, masses)
         object.__setattr__(self, "dampers", dampers)
+        object.__setattr__(self, "terms", _joint_terms(self.terms, masses))
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of its elements: a tuple of springs, dampers and masses.
+        """Names of its elements: a tuple of masses, dampers, springs and terms.
 
         See Also
         --------
@@ -119,6 +129,10 @@ class Chain:
             for (where, name), value in zip(members, values, strict=True):
                 entries = [(where, 0, where, 1.0)] if coefficient == 0 else self._entries(where, coefficient)
                 found.append(Element(name, of, tuple(entries), kind_or_number(name, value)))
+        for place, (term, link) in enumerate(self.terms):
+            signs = zip(link, (-1.0, 1.0), strict=True)
+            acts = tuple((mass, None, place, sign) for mass, sign in signs if mass != "base")
+            found.append(Element("_".join((term, *map(str, link))), term, acts, "constant"))
         return found
 
     def _entries(self, link: Link, coefficient: int) -> list[Entry]:
@@ -301,6 +315,39 @@ def _links(name: str, links: Sequence[Link], masses: int) -> tuple[Link, ...]:
             )
         found.append((ends[0], ends[1]))
     return tuple(found)
+
+
+def _joint_terms(terms: Any, masses: int) -> tuple[tuple[str, Link], ...]:
+    """Return terms and what each acts between, checked."""
+    if not isinstance(terms, Iterable) or isinstance(terms, str | bytes):
+        raise TypeError(
+            f"terms of a chain must be a list of pairs; got {arguments.shown(terms)}; write [('coulomb', (0, 1))], say"
+        )
+    found: list[tuple[str, Link]] = []
+    for given in terms:
+        if not isinstance(given, tuple | list) or len(given) != _LEAST_PAIR:
+            raise ValueError(
+                f"terms of a chain must be pairs of a name and what it acts between; got {arguments.shown(given)}; write "
+                "('coulomb', (0, 1)), say; terms of single masses are given to identify(terms=)"
+            )
+        name, link = given
+        arguments.one_of("a term of a chain", name, JOINT_TERMS)
+        (ends,) = _links("what a term acts between", [link], masses)
+        if any(name == other and set(ends) == set(between) for other, between in found):
+            raise ValueError(f"a term must act between two once; got {arguments.shown(given)} twice; leave one out")
+        found.append((name, ends))
+    return tuple(found)
+
+
+def between(link: Link, angles: Sequence[npt.NDArray[Any]], masses: int) -> npt.NDArray[np.float64]:
+    """Return the angle of the second of two against the first; the base is the channel after the masses, or at rest."""
+
+    def of(end: int | Literal["base"]) -> Any:
+        if end != "base":
+            return np.asarray(angles[end], np.float64)
+        return np.asarray(angles[masses], np.float64) if len(angles) > masses else 0.0
+
+    return np.asarray(of(link[1]) - of(link[0]), np.float64)
 
 
 def _is_single(given: Any) -> bool:

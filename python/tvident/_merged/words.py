@@ -151,14 +151,42 @@ def _channels_of(part: Part, masses: int, period: float) -> list[str]:
 def _lacking_terms(part: Part, merging: Merging) -> list[str]:
     """Return which terms equations seem to lack, and how they are asked for."""
     words = []
-    for equation, name, found in part.found.terms:
-        whose = f"of mass {part.equations.numbers[equation]}: " if merging.masses else ""
+    suspected = part.found.terms
+    terms = dict.fromkeys([*merging.terms, *(name for _, against, name, _ in suspected if against is None)])
+    kinds = merging.kinds_of_terms
+    of_masses = [(term, kinds[term]) if term in kinds else term for term in terms]
+    numbers = part.equations.numbers
+    channels = [*numbers, *(one for one in range(len(part.found.noise[0])) if one not in numbers)]
+    links = [_link(channels, mass, against, merging.masses) for mass, against, _, _ in suspected]
+    of_joints = [(name, link) for (_, _, name, _), link in zip(suspected, links, strict=True) if link is not None]
+    given = [] if merging.recorded is None else list(getattr(merging.recorded.structure, "terms", ()))
+    for (mass, _, name, found), link in zip(suspected, links, strict=True):
         amount = f"{found.value:.3g} ± {found.stderr:.1g} {merging.units[name]}"
-        terms = dict.fromkeys([*merging.terms, *(other for _, other, _ in part.found.terms)])
-        kinds = merging.kinds_of_terms
-        given = [(term, kinds[term]) if term in kinds else term for term in terms]
-        words.append(f"{whose}{BUILT_IN[name].suspected(found.value, amount)}: give terms={given}")
+        says = BUILT_IN[name].suspected(found.value, amount)
+        if link is None:
+            whose = f"of mass {numbers[mass]}: " if merging.masses else ""
+            words.append(f"{whose}{says}: give terms={of_masses}")
+        else:
+            words.append(
+                f"between {_ends(link)}: {says}: give structure=tvident.Chain(…, terms={[*given, *of_joints]})"
+            )
     return words
+
+
+def _link(channels: Sequence[int], mass: int, against: int | None, masses: int) -> tuple[int | str, int] | None:
+    """Return what a term acts between, as a chain has it; None for a mass on its own."""
+    if against is None:
+        return None
+    one, other = channels[against], channels[mass]
+    if one >= masses:
+        return "base", other
+    return min(one, other), max(one, other)
+
+
+def _ends(link: tuple[int | str, int]) -> str:
+    """Return what a term acts between, in words."""
+    one, other = link
+    return f"the base and mass {other}" if one == "base" else f"masses {one} and {other}"
 
 
 def _named(channel: int, angles: Sequence[int], torques: Sequence[int], masses: int) -> str:

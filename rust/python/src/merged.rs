@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use tvident::Status;
 use tvident::exec::workers as threads;
 use tvident::identify::{
-    Element, Entry, FoundElement as Found, Merged, MergedFound, MergedOptions, Multiplied, Trial,
+    Element, Entry, FoundElement as Found, Merged, MergedFound, MergedOptions, Multiplied, SuspectedTerm, Trial,
     identify_merged as run,
 };
 use tvident::inference::Suspect;
@@ -57,7 +57,7 @@ pub(crate) struct MergedIdentification {
     defects: Vec<ChannelDefect>,
     late: Vec<(usize, Estimate)>,
     lacking: Vec<(usize, Estimate)>,
-    terms: Vec<(usize, &'static str, Estimate)>,
+    terms: Vec<(usize, Option<usize>, &'static str, Estimate)>,
 }
 
 /// One trial: angles, torques and terms, one of each a row, a mask, positions in the result, and weights.
@@ -220,8 +220,13 @@ pub(crate) fn identify_merged<'py>(
         defects: found.defects.iter().map(|(channel, defect)| ChannelDefect::new(*channel, defect)).collect(),
         late: suspects(&found.late),
         lacking: suspects(&found.lacking),
-        terms: found.terms.iter().map(|(equation, one)| (*equation, one.missing.name(), estimate(one))).collect(),
+        terms: found.terms.iter().map(term).collect(),
     })
+}
+
+/// A suspected term: the mass, what it moves against, the term's name and its factor.
+fn term(one: &SuspectedTerm) -> (usize, Option<usize>, &'static str, Estimate) {
+    (one.motion.mass, one.motion.against, one.suspect.missing.name(), estimate(&one.suspect))
 }
 
 /// What channels are suspected of, with standard errors.

@@ -22,6 +22,8 @@ pub use instrumented::two_stage_rows::WEAK_INSTRUMENT;
 pub use kinds::Kind;
 pub use merged::form::identify_merged;
 pub use merged::found::{FoundElement, MergedFound};
+pub use merged::possible_terms::MotionOf;
+pub use merged::suspected_terms::SuspectedTerm;
 pub use merged::system::{Element, Entry, Merged, MergedOptions, Multiplied, Trial};
 pub use options::{Method, Options, Repeated, StrongForm, Task, WeakForm, WidthFrom};
 pub use route::identify_all;

@@ -166,11 +166,9 @@ impl JudgedTerm<'_> {
     ) -> Result<Option<FactorsAndChanges>, Error> {
         let Some((problem, fit)) = self.beside(regressors, stages)? else { return Ok(None) };
         let (known, count) = (self.model.constant.len(), problem.layout.constant);
-        let factor = |constant: usize| {
-            let variance = self.inflation * fit.variance_of(&problem, constant, self.covariance, stages)?;
-            Ok((fit.pooled.values[constant], variance.sqrt()))
-        };
-        let factors = (known..count).map(factor).collect::<Result<_, Error>>()?;
+        let variances = fit.variances_of(&problem, known..count, self.covariance, stages)?;
+        let values = fit.pooled.values[known..count].iter().zip(variances);
+        let factors = values.map(|(&value, variance)| (value, (self.inflation * variance).sqrt())).collect();
         let with_last = &fit.pooled.inverse[(count - 1) * count..];
         let changes = with_last[..count - 1].iter().map(|with| with / with_last[count - 1]).collect();
         Ok(Some((factors, changes)))

@@ -121,24 +121,40 @@ impl Fit {
         covariance: &RowCovariance,
         stages: &mut Stages<'_, '_>,
     ) -> Result<f64, Error> {
+        Ok(self.variances_of(problem, constant..constant + 1, covariance, stages)?.into_iter().sum())
+    }
+
+    /// The same of several, with the influences of all rows made once.
+    pub(crate) fn variances_of(
+        &self,
+        problem: &Problem<'_>,
+        some: Range<usize>,
+        covariance: &RowCovariance,
+        stages: &mut Stages<'_, '_>,
+    ) -> Result<Vec<f64>, Error> {
         let constants = problem.layout.constant;
-        let weights = &self.pooled.inverse[constant * constants..];
-        let mut moved = Vec::new();
+        let mut moved = vec![Vec::new(); some.len()];
         // As many columns at a time as there are threads.
         for first in (0..constants).step_by(stages.workers.get()) {
-            let some = first..constants.min(first + stages.workers.get());
-            for (column, weight) in self.influences(problem, some, stages)?.iter().zip(&weights[first..]) {
-                moved.resize(column.len(), 0.0);
-                moved.iter_mut().zip(&**column).for_each(|(sum, value)| *sum += weight * value);
+            let here = first..constants.min(first + stages.workers.get());
+            for (column, other) in self.influences(problem, here, stages)?.iter().zip(first..) {
+                for (moved, constant) in moved.iter_mut().zip(some.clone()) {
+                    let weight = self.pooled.inverse[constant * constants + other];
+                    moved.resize(column.len(), 0.0);
+                    moved.iter_mut().zip(&**column).for_each(|(sum, value)| *sum += weight * value);
+                }
             }
         }
-        let mut noisy = vec![0.0; moved.len()];
-        stages.fill([&mut noisy], |rows, parts| {
-            for part in parts {
-                covariance.add_product(&moved, rows.clone(), part);
-            }
-        })?;
-        Ok(moved.iter().zip(&noisy).map(|(a, b)| a * b).sum())
+        let of = |moved: &Vec<f64>, stages: &mut Stages<'_, '_>| -> Result<f64, Error> {
+            let mut noisy = vec![0.0; moved.len()];
+            stages.fill([&mut noisy], |rows, parts| {
+                for part in parts {
+                    covariance.add_product(moved, rows.clone(), part);
+                }
+            })?;
+            Ok(moved.iter().zip(&noisy).map(|(a, b)| a * b).sum())
+        };
+        moved.iter().map(|moved| of(moved, stages)).collect()
     }
 
     /// The influence of every row on each of some constants.

@@ -1,6 +1,7 @@
 //! What is found of merged rows.
 
 use crate::identify::kinds::Kind;
+use crate::identify::merged::suspected_terms::SuspectedTerm;
 use crate::identify::results::{Constant, SampleResults};
 use crate::identify::scanned::Scan;
 use crate::inference::constancy::Test;
@@ -77,8 +78,8 @@ pub struct MergedFound {
     pub late: Vec<(usize, Suspect)>,
     /// Angles that no equation is of whose gain seems to be wrong, and the part of themselves that they lack.
     pub lacking: Vec<(usize, Suspect)>,
-    /// Terms that equations seem to lack, each with its equation.
-    pub terms: Vec<(usize, Suspect)>,
+    /// Terms that equations seem to lack.
+    pub terms: Vec<SuspectedTerm>,
 }
 
 impl MergedFound {

@@ -159,17 +159,27 @@ impl MergedSession<'_, '_, '_> {
 
     /// What a term adds to the torque of an equation, in its rows: by trial, what it is.
     pub(crate) fn column_of(&mut self, equation: usize, terms: &[TermSamples<'_>]) -> Result<Regressor, Error> {
+        let each: Vec<Vec<TermSamples<'_>>> = terms.iter().map(|term| vec![*term]).collect();
+        Ok(self.columns_of(equation, &each)?.pop().unwrap_or_default())
+    }
+
+    /// The same of several terms of every trial, with one walk along the samples.
+    pub(crate) fn columns_of(
+        &mut self,
+        equation: usize,
+        terms: &[Vec<TermSamples<'_>>],
+    ) -> Result<Vec<Regressor>, Error> {
         let (rows, equations, group) = (self.all.rows.len(), self.merged.equations(), self.all.group);
         let (function, delta, workers) = (self.all.function, self.options.delta, self.stages.workers);
-        let mut value = vec![0.0; rows];
-        for (number, (trial, term)) in self.merged.trials.iter().zip(terms).enumerate() {
+        let mut values = vec![vec![0.0; rows]; terms.first().map_or(0, Vec::len)];
+        for (number, (trial, terms)) in self.merged.trials.iter().zip(terms).enumerate() {
             let record = Record {
                 angle: trial.angles[equation.min(trial.angles.len() - 1)],
                 torque: trial.torques[equation],
                 noise: None,
                 coefficients: [Coefficient::Unknown; 3],
                 constant: [true; 3],
-                terms: vec![*term],
+                terms: terms.clone(),
                 constant_terms: true,
                 lag: 0.0,
                 angle_zero: 0.0,
@@ -178,15 +188,18 @@ impl MergedSession<'_, '_, '_> {
             };
             let weak = self.stages.stage(|watch| WeakRows::build(&record, function, delta, None, workers, watch))?;
             let weight = self.weights.equations[equation];
-            for (time, term) in weak.rows.regressors[3].value.iter().enumerate() {
-                let row = time * group + number * equations + equation;
-                if row < rows && self.all.rows.usable[row] {
-                    value[row] = weight * term;
+            for (value, regressor) in values.iter_mut().zip(&weak.rows.regressors[3..]) {
+                for (time, term) in regressor.value.iter().enumerate() {
+                    let row = time * group + number * equations + equation;
+                    if row < rows && self.all.rows.usable[row] {
+                        value[row] = weight * term;
+                    }
                 }
             }
         }
         // The noise of angles hardly enters, if at all.
         let noise = self.all.rows.regressors[0].noise.each_ref().map(|kernel| vec![0.0; kernel.len()]);
-        Ok(Regressor { companion: vec![0.0; rows], value, noise })
+        let of = |value| Regressor { companion: vec![0.0; rows], value, noise: noise.clone() };
+        Ok(values.into_iter().map(of).collect())
     }
 }

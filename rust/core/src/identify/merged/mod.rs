@@ -15,6 +15,7 @@ pub(crate) mod freed;
 pub(crate) mod interleaved;
 pub(crate) mod jumps;
 pub(crate) mod lags;
+pub(crate) mod possible_terms;
 pub(crate) mod report;
 pub(crate) mod scan;
 pub(crate) mod session;

@@ -66,25 +66,11 @@ impl MergedSession<'_, '_, '_> {
         let mostly_noise = is_mostly_noise(&problem, rows, model, fit, &weakest, 1.0, &mut self.stages)?;
         let averages = self.averages(fitted, &correlated, &noise)?;
         let shared = self.left_shared(fitted, &averages);
-        let AtRows { mut status, errors, covariances, pairs } =
+        let AtRows { mut status, mut errors, covariances, pairs } =
             self.at_rows(fitted, &averages, &shared.errors, &covariance, inflation);
         let spread = self.spread(fitted, &averages, &shared, &noise);
-        let count = model.constant.len();
-        let kind = |place: usize| if place < model.windowed.len() { Kind::Windowed } else { Kind::Constant };
-        let elements = model.windowed.iter().chain(&model.constant).enumerate().zip(spread);
-        let elements = elements.map(|((place, &element), spread)| {
-            let constant = place.checked_sub(model.windowed.len());
-            FoundElement {
-                element,
-                kind: kind(place),
-                values: constant.map_or_else(Vec::new, |one| vec![fit.pooled.values[one]]),
-                stderr: constant.map_or_else(Vec::new, |one| vec![covariance[one * (count + 1)].max(0.0).sqrt()]),
-                test: fitted.tests.iter().find(|(one, _)| *one == element).map(|(_, test)| test.clone()),
-                spread,
-            }
-        });
-        let mut found = MergedFound { elements: elements.collect(), ..self.nothing_yet(fitted) };
-        found.elements.sort_by_key(|one| one.element);
+        let elements = elements(fitted, &covariance, spread);
+        let mut found = MergedFound { elements, ..self.nothing_yet(fitted) };
         (found.constants, found.condition, found.weakest) = (model.constant.clone(), fit.pooled.condition, weakest);
         for (holds, flag) in [
             (self.at_end || fitted.has_shortest_windows(), Status::WINDOW_LIMIT),
@@ -102,7 +88,14 @@ impl MergedSession<'_, '_, '_> {
         let SuspectedChannels { each, beside } = self.suspected_channels(fitted, &noise, &correlated)?;
         let SuspectedTerms { each: terms, beside: beside_terms } = self.suspected_terms(fitted, &noise, &correlated)?;
         found.changes_in_common = self.changes_in_common(fitted)?;
-        let is_wrong = self.is_wrong(fitted, &found, [beside, beside_terms], (&errors, &covariance));
+        let beside = [beside, beside_terms];
+        let is_wrong = self.is_wrong(fitted, &found, &beside, (&errors, &covariance));
+        for beside in beside.iter().flatten() {
+            widen(fitted, beside, &mut errors, &mut covariance);
+        }
+        for one in &mut found.elements {
+            one.stderr = stderr_of(fitted, one.element, &covariance);
+        }
         status.iter_mut().filter(|_| is_wrong).for_each(|status| *status |= Status::NOISE_MODEL.bits());
         (found.covariance, found.pairs) = (covariance, pairs);
         (found.late, found.lacking) = each.into_iter().partition(|(_, suspect)| suspect.missing == Missing::Lag);
@@ -280,12 +273,12 @@ impl MergedSession<'_, '_, '_> {
         &self,
         fitted: &MergedFit,
         found: &MergedFound,
-        beside: [Option<Fit>; 2],
+        beside: &[Option<Fit>; 2],
         (errors, covariance): (&[Vec<f64>], &[f64]),
     ) -> bool {
         let is_unfollowed = found.changes_in_common && fitted.error > UNFOLLOWED;
-        let is_other = |beside: Fit| self.are_others(fitted, &beside, errors, covariance);
-        is_unfollowed || self.is_contradicted(fitted) || beside.into_iter().flatten().any(is_other)
+        let is_other = |beside: &Fit| self.are_others(fitted, beside, errors, covariance);
+        is_unfollowed || self.is_contradicted(fitted) || beside.iter().flatten().any(is_other)
     }
 
     /// Whether a coefficient that stays constant differs between parts of the record, beside equations that leave more than noise explains.
@@ -401,5 +394,46 @@ impl MergedSession<'_, '_, '_> {
         let mut found = MergedFound { record_status: Status::RANK_DEFICIENT, ..self.undetermined() };
         found.take(&[], results);
         Ok(found)
+    }
+}
+
+/// The elements, in their order.
+fn elements(fitted: &MergedFit, covariance: &[f64], spread: Vec<Vec<(f64, f64)>>) -> Vec<FoundElement> {
+    let model = &fitted.model;
+    let each = model.windowed.iter().chain(&model.constant).enumerate().zip(spread);
+    let mut found: Vec<FoundElement> = each
+        .map(|((place, &element), spread)| {
+            let constant = place.checked_sub(model.windowed.len());
+            FoundElement {
+                element,
+                kind: if constant.is_none() { Kind::Windowed } else { Kind::Constant },
+                values: constant.map_or_else(Vec::new, |one| vec![fitted.fit.pooled.values[one]]),
+                stderr: stderr_of(fitted, element, covariance),
+                test: fitted.tests.iter().find(|(one, _)| *one == element).map(|(_, test)| test.clone()),
+                spread,
+            }
+        })
+        .collect();
+    found.sort_by_key(|one| one.element);
+    found
+}
+
+/// The standard error of an element that is a constant; none of one that is windowed.
+fn stderr_of(fitted: &MergedFit, element: usize, covariance: &[f64]) -> Vec<f64> {
+    let constants = &fitted.model.constant;
+    let place = constants.iter().position(|one| *one == element);
+    place.map(|one| covariance[one * (constants.len() + 1)].max(0.0).sqrt()).into_iter().collect()
+}
+
+/// Makes errors hold what estimates change by in a fit beside what is suspected to be missing.
+fn widen(fitted: &MergedFit, beside: &Fit, errors: &mut [Vec<f64>], covariance: &mut [f64]) {
+    for (one, errors) in errors.iter_mut().enumerate() {
+        let change = beside.median(one) - fitted.fit.median(one);
+        errors.iter_mut().filter(|_| change.is_finite()).for_each(|error| *error = error.hypot(change));
+    }
+    let count = fitted.model.constant.len();
+    for one in 0..count {
+        let change = beside.pooled.values[one] - fitted.fit.pooled.values[one];
+        covariance[one * (count + 1)] += if change.is_finite() { change * change } else { 0.0 };
     }
 }
