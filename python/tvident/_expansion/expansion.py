@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import takewhile
-from operator import ge
+from itertools import islice
 from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
@@ -22,8 +22,12 @@ InertiaTimes: TypeAlias = Literal["acceleration", "momentum"]
 LARGEST = 64
 """Sizes that are tried at most where the record chooses."""
 
+_MOST = 1024
+"""Functions: a record's equations are solved in a second or two for so many, and for four times as many in half a minute."""
+
 _NAMES = ("bspline", *FAMILIES)
 _DEGREES = (1, 5)
+_SHOWN = 6
 _TWO = 2
 
 
@@ -42,9 +46,9 @@ class Expansion:
         so many vanishing moments); or a function ``f(x, size)`` of values of the channel, shape (m,), which returns shape (m, size). A pair
         belongs to the two channels of `of`.
     size : "auto", int, or a pair of them
-        How many functions. ``"auto"``: that with the lowest corrected Akaike criterion, in which overlapping equations count as
-        often as they tell something new; ``result.expansions["stiffness"].sizes`` is the table of all that were tried. A curve of time
-        is the mean over those that explain the record nearly as well.
+        How many functions, at most 1024. ``"auto"``: that with the lowest corrected Akaike criterion, in which overlapping equations
+        count as often as they tell something new; ``result.expansions["stiffness"].sizes`` is the table of all that were tried. A curve
+        of time is the mean over those that explain the record nearly as well.
     of : array_like, shape (n,), or a pair of them, optional
         The recorded channel that the parameter is a function of, such as a position; by default time. Of two channels: all products of
         the functions of each. Its noise counts as part of the curve. Trials share it. Equations that touch a missing value are left
@@ -59,7 +63,7 @@ class Expansion:
         What an expanded inertia stands for: ``"acceleration"``, I θ̈, is the equation of motion (1) as it is for all other kinds.
         ``"momentum"``, d(I θ̇)/dt = I θ̈ + İ θ̇, is Newton's law where mass moves with the angle and leaves with its momentum.
     largest : int, optional
-        The largest size that is tried; of two channels the most functions in all.
+        The largest size that is tried, at most 1024; of two channels the most functions in all.
 
     Raises
     ------
@@ -109,7 +113,12 @@ class Expansion:
         if self.degree > _DEGREES[1]:
             raise ValueError(f"degree must be at most {_DEGREES[1]}; got {self.degree}; take 3")
         arguments.one_of("inertia_times", self.inertia_times, get_args(InertiaTimes))
-        arguments.whole_number("largest", self.largest, least=1)
+        arguments.whole_number("largest", self.largest, least=1, most=_MOST)
+        if math.prod(one or 1 for one in self.given_sizes) > _MOST:
+            raise ValueError(
+                f"size must be at most {_MOST} functions in all; got {' x '.join(map(str, self.given_sizes))}; a curve of fewer shows "
+                "all that a record holds"
+            )
         if isinstance(self.family, tuple | list) and len(self.family) != self.dimensions:
             raise ValueError(
                 f"a pair of families belongs to two channels; got {len(self.family)} families and {self.dimensions} channels; "
@@ -119,8 +128,9 @@ class Expansion:
             if size is not None:
                 last = next(one for one in family.sizes() if one >= size)
                 if last != size:
-                    some = ", ".join(str(one) for one in takewhile(partial(ge, last), family.sizes()))
+                    some = ", ".join(str(one) for one in islice(family.sizes(), _SHOWN))
                     raise ValueError(f"size must be one of {some}…; got {size}; take {last}")
+        _ = self.given_limits
 
     @property
     def is_of_time(self) -> bool:
@@ -194,14 +204,15 @@ class Expansion:
         given_limits : the ranges.
         ExpandedParameter.size : what was chosen.
         """
-        several = isinstance(self.size, tuple | list) or (isinstance(self.size, np.ndarray) and self.size.ndim > 0)
+        several = isinstance(self.size, tuple | list) or _several(self.size)
         each: Sequence[Any] = self.size if several else [self.size] * self.dimensions  # type: ignore[assignment] # several
         if len(each) != self.dimensions:
             raise ValueError(
                 f"size must be one number for each of {self.dimensions} coordinates; got {len(each)}; give one number for all"
             )
         return tuple(
-            None if arguments.is_word(one, "auto") else arguments.whole_number("size", one, least=1) for one in each
+            None if arguments.is_word(one, "auto") else arguments.whole_number("size", one, least=1, most=_MOST)
+            for one in each
         )
 
     @property
@@ -214,7 +225,13 @@ class Expansion:
         """
         if self.limits is None:
             return (None,) * self.dimensions
-        each: Sequence[Any] = self.limits if np.ndim(self.limits[0]) > 0 else [self.limits] * self.dimensions
+        several = _several(self.limits)
+        each: Sequence[Any] = self.limits if several and _several(self.limits[0]) else [self.limits] * self.dimensions
+        if len(each) != self.dimensions or not all(_several(one) and len(one) == _TWO for one in each):
+            raise ValueError(
+                f"limits must be a pair of numbers, or one pair for each of {self.dimensions} coordinates; got "
+                f"{arguments.shown(self.limits)}; write (0, 1), say"
+            )
         found = []
         for one in each:
             low, high = (arguments.finite_number("limits", end) for end in one)
@@ -250,6 +267,13 @@ class Expansion:
         if callable(one):
             return Family(partial(_own_values, one, limits), every)
         return family_of(arguments.one_of("family", one, _NAMES), self.degree, is_period=self.limits is not None)
+
+
+def _several(given: Any) -> bool:
+    """Return whether there is something in what was given."""
+    return bool(isinstance(given, tuple | list) and given) or bool(
+        isinstance(given, np.ndarray) and given.ndim and given.size
+    )
 
 
 _STEP = 1e-3
