@@ -99,7 +99,7 @@ def test_power_goes_where_it_tells_most() -> None:
         ({"band": None}, r"band=\(0.5, 12\)"),
         ({"torque_rms": None}, "torque or the time"),
         ({"band": 5}, "lowest and the highest frequency; got 5"),
-        ({"band": "0.5 12"}, "lowest and the highest frequency; got 0.5 12"),
+        ({"band": "0.5 12"}, "lowest and the highest frequency; got '0.5 12'"),
         ({"band": [(1, 2), 3]}, r"lowest and the highest frequency; got \[\(1, 2\), 3\]"),
     ],
 )

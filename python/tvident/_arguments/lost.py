@@ -115,5 +115,6 @@ def _steps(values: npt.NDArray[np.number], places: npt.NDArray[np.intp], side: i
     if side > min(_SIDES):
         rows = np.column_stack([rows, number**2, number**3])
     around = values[places[:, None] + np.arange(1 - side, side + 1)].astype(np.float64)
-    found = np.linalg.pinv(rows) @ around.T
+    with np.errstate(invalid="ignore"):  # what is infinite has no slope
+        found = np.linalg.pinv(rows) @ around.T
     return found[2], found[1]

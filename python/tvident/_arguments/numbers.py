@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping
 from numbers import Integral, Real
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +14,9 @@ from tvident._arguments.shown import shown
 _BEYOND_COUNTING = 1 << 63
 """No whole number this large fits into the core's."""
 
+_NO_NUMBERS = (bool, np.timedelta64)
+"""What Python, or NumPy, takes for whole numbers."""
+
 LARGEST = 1e70
 """Fourth powers of larger values, which variances of products are made of, leave the range of doubles."""
 
@@ -19,7 +24,7 @@ LARGEST = 1e70
 def whole_number(name: str, value: object, *, least: int | None = None, most: int | None = None) -> int:
     """Return a whole number, within limits if there are any."""
     # Most are Python's own, which are asked for first: abstract classes are slow to answer.
-    if type(value) is not int and (not isinstance(value, Integral) or isinstance(value, bool)):
+    if type(value) is not int and (not isinstance(value, Integral) or isinstance(value, _NO_NUMBERS)):
         number = _float(value)
         whole = number is not None and number.is_integer()
         cure = f"pass {shown(int(number))}" if whole and number is not None else "pass an integer"
@@ -68,12 +73,26 @@ def _float(value: object) -> float | None:
     """Return a real number as a double, or None for what is none."""
     if type(value) is float:
         return value
-    if not isinstance(value, Real) or isinstance(value, bool):
+    if not isinstance(value, Real) or isinstance(value, _NO_NUMBERS):
         return None
     try:
         return float(value)
     except OverflowError:
         return math.inf if value == abs(value) else -math.inf
+
+
+def is_several(value: object) -> bool:
+    """Return whether something holds several values: no text, and no single number in an array."""
+    if isinstance(value, np.ndarray):
+        return value.ndim > 0
+    return isinstance(value, Iterable) and not isinstance(value, str | bytes)
+
+
+def mapping(name: str, value: object, example: str) -> Mapping[Any, Any]:
+    """Return a mapping; refuse what is none, with an example of what would be right."""
+    if not isinstance(value, Mapping):
+        raise TypeError(f"{name} must be a mapping; got {shown(value)}; write {example}, say")
+    return value
 
 
 def one_of(name: str, value: object, choices: tuple[str, ...]) -> str:

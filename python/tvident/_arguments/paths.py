@@ -15,6 +15,8 @@ def path_of(what: str, value: object) -> Path:
     ------
     TypeError
         If it is neither text nor a path.
+    ValueError
+        If no file can have that name.
     """
     if not isinstance(value, str | os.PathLike) or not isinstance(os.fspath(value), str):
         cure = (
@@ -23,4 +25,6 @@ def path_of(what: str, value: object) -> Path:
             else "write 'rig.csv', say"
         )
         raise TypeError(f"{what} must be the name of a file; got {shown(value)}; {cure}")
+    if not os.fspath(value) or "\0" in os.fspath(value):
+        raise ValueError(f"{what} must be a name that a file can have; got {shown(value)}; write 'rig.csv', say")
     return Path(value)

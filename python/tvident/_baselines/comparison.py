@@ -162,9 +162,15 @@ def compare_methods(
             f"methods are compared on one record without gaps; got shape {angles.shape}; cut a part without missing samples"
         )
     rate = arguments.positive_number("sample_rate", sample_rate)
+    if angles.size < 2 * _half_of_test_function(rate) + 1:
+        raise ValueError(
+            f"methods are compared on a record of a tenth of a second or more; got {angles.size} samples at {rate:g} Hz; record for longer"
+        )
     known = None
     if truth is not None:
-        known = np.stack([np.broadcast_to(np.asarray(truth[name], np.float64), angles.shape) for name in COEFFICIENTS])
+        known = np.stack([_of_samples(name, truth, angles.shape) for name in COEFFICIENTS])
+    if methods is not None and not arguments.is_several(methods):
+        raise TypeError(f"methods must be a list; got {arguments.shown(methods)}; write ['tvident', 'forgetting'], say")
     names = list(METHODS) if methods is None else [arguments.one_of("a method", one, tuple(METHODS)) for one in methods]
     results, rows = {}, []
     for name in names:
@@ -220,11 +226,28 @@ def _rise_time(value: Array, truth: Array, rate: float) -> float:
     return float(np.median(found)) if found else float("nan")
 
 
+def _half_of_test_function(rate: float) -> int:
+    """Return how many samples of the test function in which torques are averaged are on either side of its middle."""
+    return max(4, int(0.05 * rate))
+
+
+def _of_samples(name: str, truth: Mapping[str, npt.ArrayLike], shape: tuple[int, ...]) -> Array:
+    """Return a true parameter at every sample."""
+    if name not in arguments.mapping("truth", truth, "{'inertia': …, 'damping': …, 'stiffness': …}"):
+        raise ValueError(f"truth must have inertia, damping and stiffness; got no {name}; add it, or leave truth out")
+    values = np.asarray(arguments.any_array(f"truth[{name!r}]", truth[name]), np.float64)
+    if values.shape not in {(), (1,), shape}:
+        raise ValueError(
+            f"truth must have a value for every sample; got {name} of shape {values.shape}; give shape {shape}"
+        )
+    return np.broadcast_to(values, shape)
+
+
 def _explained(found: ValueAndError, angle: Array, torque: Array, rate: float) -> dict[str, float]:
     """Return how much of the torque's variance the parameters account for, in averages over a test function of a tenth of a second."""
     values, there = found[0], np.ones((1, angle.size), bool)
     record = ExpandedRecord(
-        angle[np.newaxis], torque[np.newaxis], there, there[0], 1 / rate, max(4, int(0.05 * rate)), 7
+        angle[np.newaxis], torque[np.newaxis], there, there[0], 1 / rate, _half_of_test_function(rate), 7
     )
     everything = slice(0, (record.rows - 1) * record.stride + record.length)
     curves = [(of_one(name), [np.nan_to_num(one)]) for name, one in zip(COEFFICIENTS, values, strict=True)]
@@ -234,7 +257,8 @@ def _explained(found: ValueAndError, angle: Array, torque: Array, rate: float) -
     usable = np.all(record.windows(known[everything]) > 0, axis=1)
     if not usable.any():
         return {"vaf": float("nan")}
-    return {"vaf": 100 * (1 - float(np.var((measured - predicted)[usable]) / np.var(measured[usable])))}
+    whole = float(np.var(measured[usable]))
+    return {"vaf": 100 * (1 - float(np.var((measured - predicted)[usable])) / whole) if whole > 0 else float("nan")}
 
 
 def _ours(angle: Array, torque: Array, rate: float, **given: Any) -> ValueAndError:

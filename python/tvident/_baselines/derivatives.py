@@ -58,7 +58,7 @@ def chebyshev_derivatives(samples: npt.ArrayLike, size: int, *, delta: float) ->
     >>> bool(np.allclose(found[2], 6 * t))
     True
     """
-    record = np.asarray(arguments.channel("samples", samples), np.float64)
+    record = _one_record(samples)
     arguments.whole_number("size", size, least=1)
     if size > record.size:
         raise ValueError(f"size must be at most the {record.size} samples; got {size}; take fewer polynomials")
@@ -117,7 +117,7 @@ def lanczos_derivatives(samples: npt.ArrayLike, window_length: int, *, delta: fl
     >>> int(np.isnan(found[1]).sum())
     20
     """
-    record = np.asarray(arguments.channel("samples", samples), np.float64)
+    record = _one_record(samples)
     period = arguments.positive_number("delta", delta)
     length = arguments.window_length("window_length", window_length, period, odd=True)
     arguments.check_window("window_length", length, record.size, least=3)
@@ -173,3 +173,11 @@ def savgol_derivatives(samples: npt.ArrayLike, window_length: int, polyorder: in
     True
     """
     return np.stack([savgol_filter(samples, window_length, polyorder, deriv=d, delta=delta) for d in range(_ORDERS)])
+
+
+def _one_record(samples: npt.ArrayLike) -> Array:
+    """Return the samples of one record."""
+    record = np.asarray(arguments.channel("samples", samples), np.float64)
+    if record.ndim != 1:
+        raise ValueError(f"samples must be one record; got shape {record.shape}; take one of them")
+    return record

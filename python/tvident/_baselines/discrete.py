@@ -63,7 +63,9 @@ def tvarx(
     >>> bool(abs(found.values[3000, 2] / rig.stiffness[0] - 1) < 1e-3)
     True
     """
-    period = arguments.positive_number("delta", delta) * arguments.whole_number("every", every, least=1)
+    every = arguments.whole_number("every", every, least=1)
+    window = arguments.whole_number("window", window, least=1)
+    period = arguments.positive_number("delta", delta) * every
     both = [np.asarray(one, np.float64) for one in arguments.channels(angle=angle, torque=torque)]
     if both[0].ndim != 1:
         raise ValueError(f"angle and torque must be one record; got shape {both[0].shape}; take one of them")

@@ -160,7 +160,7 @@ def random_walk_smoother(
             f"steps must be one for each of {design.shape[1]} parameters; got shape {each.shape}; give 0 for constants"
         )
     walk = np.diag((each * scale) ** 2)
-    variance = arguments.positive_number("noise", noise) ** 2
+    variance = arguments.positive_number("noise", noise, most=arguments.LARGEST) ** 2
     count, size = design.shape
     means, spreads = np.empty((count, size)), np.empty((count, size, size))
     now, spread = np.zeros(size), np.eye(size) * (_VAGUE * np.sqrt(variance)) ** 2

@@ -69,6 +69,7 @@ def expanded_least_squares(
     values = [functions.values(places, size, 0) if size > 1 else np.ones((right.size, 1)) for size in each]
     matrix = np.concatenate([one * column[:, np.newaxis] for one, column in zip(values, design.T, strict=True)], axis=1)
     norm = np.linalg.norm(matrix, axis=0)
+    norm = np.where(norm > 0, norm, 1.0)
     factor, _, rank, _ = np.linalg.lstsq(matrix / norm, right, rcond=None)
     left = right - matrix / norm @ factor
     inverse = np.linalg.pinv((matrix / norm).T @ (matrix / norm)) * (left @ left) / max(1, right.size - int(rank))

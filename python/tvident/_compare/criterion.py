@@ -36,7 +36,8 @@ def akaike_weights(scores: Array) -> Array:
     """Return the weight of each model; a model without a score has none."""
     if not np.isfinite(scores).any():
         return np.zeros(scores.size)
-    relative = np.exp(-0.5 * (scores - scores.min()))
+    with np.errstate(under="ignore"):  # where a caller had underflows raised
+        relative = np.exp(-0.5 * (scores - scores.min()))
     return np.asarray(relative / relative.sum())
 
 

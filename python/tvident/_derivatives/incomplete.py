@@ -85,7 +85,8 @@ def leaves_out(nan_policy: str, max_gap: int | str | None, min_observations: int
     for name, value in (("max_gap", max_gap), ("min_observations", min_observations)):
         if value is not None:
             raise ValueError(
-                f"{name} must go with nan_policy='omit' or weights; got {value!r} with {nan_policy!r}; give one of them, or no {name}"
+                f"{name} must go with nan_policy='omit' or weights; got {arguments.shown(value)} with {nan_policy!r}; give one of them, "
+                f"or no {name}"
             )
     return False
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from tvident import _arguments as arguments
 from tvident._figures.style import ACCENT, FOUND, MUTED, TRUTH, Place, legend, panels, plain, style
 
 _SHOWN = 60.0
@@ -112,6 +113,10 @@ def plot_expansion(
         main = axes[0]
         main.fill_between(position, value - 2 * error, value + 2 * error, color=FOUND, alpha=0.25, linewidth=0)
         main.plot(position, value, color=FOUND, label=f"{curve.size} functions ({plain(curve.family)})")
+        if truth is not None and not callable(truth):
+            raise TypeError(
+                f"truth must be a function of the position; got {arguments.shown(truth)}; pass lambda x: 6 / x, say"
+            )
         if truth is not None:
             main.plot(position, np.asarray(truth(position)), color=TRUTH, linewidth=0.9, linestyle="--", label="truth")
             legend(main)

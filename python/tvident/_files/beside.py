@@ -23,7 +23,7 @@ _DAMAGES = (ValueError, TypeError, KeyError, RecursionError)
 def place_beside(path: Path) -> Path | None:
     """Return where settings of a table stand; nowhere beside pipes and devices."""
     name = path.name + _ENDING
-    if path.name == "-" or writes_through(path) or len(name.encode(errors="surrogateescape")) > _LONGEST_NAME:
+    if path.name in {"", "-"} or writes_through(path) or len(name.encode(errors="surrogateescape")) > _LONGEST_NAME:
         return None
     return path.with_name(name)
 

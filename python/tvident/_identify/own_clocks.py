@@ -272,6 +272,8 @@ def own_clocks(
             "sample_rate=(that of the angle, that of the torque)"
         )
     (name, value), *_ = given.items()
+    if channels["torque"] is None:
+        raise TypeError("torque must hold numbers; got None; give an array of numbers")
     angle, torque = (arguments.channel(one, values) for one, values in channels.items() if values is not None)
     for one, array in (("angle", angle), ("torque", torque)):
         if array.ndim != 1:

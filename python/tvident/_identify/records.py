@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -41,7 +41,7 @@ _CHANCE = 3.09
 
 def names_shared(share: str | Sequence[str]) -> tuple[str, ...]:
     """Return what records share, by name, each once."""
-    names = tuple(share) if isinstance(share, Iterable) and not isinstance(share, str | bytes) else (share,)
+    names = tuple(share) if arguments.is_several(share) else (share,)
     return tuple(dict.fromkeys(arguments.one_of("share", name, COEFFICIENTS) for name in names))
 
 
@@ -236,7 +236,7 @@ def _each(name: str, value: Any, count: int) -> Sequence[Any]:
         return [value] * count
     if name in _CHANNELS:
         several = _records(name, value)
-        if several is None and name != "t" and np.ndim(value) > 1:
+        if several is None and name != "t" and len(_shape(name, value)) > 1:
             several, value = len(value), list(value)
         if several is None and name == "t":
             return [value] * count

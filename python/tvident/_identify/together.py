@@ -356,7 +356,7 @@ def _check(angle: Any, options: Options) -> None:
             )
     if options.structure is not None and options.dof_axis is None:
         raise ValueError(
-            f"structure= must come with dof_axis=, the axis of the masses; got {options.structure!r} alone; add dof_axis=0"
+            f"structure= must come with dof_axis=, the axis of the masses; got {arguments.shown(options.structure)} alone; add dof_axis=0"
         )
     if (
         options.ensemble_axis is None

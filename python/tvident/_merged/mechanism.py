@@ -93,7 +93,7 @@ class Mechanism:
 
     def __post_init__(self) -> None:
         for of in ("kinetic", "potential", "forces"):
-            functions = dict(getattr(self, of))
+            functions = dict(arguments.mapping(of, getattr(self, of), "{'inertia of a link': function}"))
             for name, function in functions.items():
                 name_of_term(name)
                 if not callable(function):
@@ -104,6 +104,7 @@ class Mechanism:
             object.__setattr__(self, of, functions)
         if not self.kinetic and not self.potential:
             raise ValueError("a mechanism must have an energy; got none; give kinetic={'inertia of …': function}")
+        arguments.mapping("kinds", self.kinds, "{'inertia of a link': 'constant'}")
         unmentioned("kinds of a mechanism", self.kinds, self.names)
         for name, kind in self.kinds.items():
             kind_or_number(name, kind)

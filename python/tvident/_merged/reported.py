@@ -142,8 +142,9 @@ class Reported(MergedSimulated, Telling, Tabular):
             raise ValueError(
                 "the record must be there; got a result without one, or of which nothing can be known; identify again"
             )
+        trial = arguments.whole_number("trial", trial)
         if not -merging.trials <= trial < merging.trials:
-            raise IndexError(f"trial must be below {merging.trials}, the number of trials; got {trial}")
+            raise IndexError(f"trial must be below {merging.trials}, the number of trials; got {trial}; count from 0")
         values = {name: every_sample(one, merging.samples, merging.step) for name, one in self.elements.items()}
         both: Array = np.zeros((2, 0, 0))
         for part in merging.parts:

@@ -158,7 +158,11 @@ class MergedSimulated:
         pushed: Any = torque
         if angle is None:
             recorded = self._record("angle= and torque=")
-            recorded_angle, pushed = ([rows_of(one) for one in of] for of in (recorded.angles, recorded.torques))
+            counts = [rows_of(one).shape[1] for one in recorded.angles]
+            recorded_angle, pushed = (
+                [rows_of(one, count) for one, count in zip(of, counts, strict=True)]
+                for of in (recorded.angles, recorded.torques)
+            )
             if not self._merging.masses:
                 recorded_angle, pushed = ([one[0] for one in of] for of in (recorded_angle, pushed))
             elif self._merging.trials == 1:
@@ -184,6 +188,10 @@ class MergedSimulated:
 
     def _trials(self, name: str, values: Any) -> list[Array]:
         """Return a channel by trial, each of shape (masses, m)."""
+        if not arguments.is_several(values):
+            raise TypeError(
+                f"{name} must be an array, or a list of one for each trial; got {arguments.shown(values)}; pass its samples"
+            )
         each = [values] if self._is_alone(values) else list(values)
         several = [np.asarray(in_units_of(self.units, name, one), np.float64) for one in each]
         masses = self._merging.masses
@@ -260,7 +268,8 @@ class MergedSimulated:
                 f"the state at the first sample must be known; got {trials} trials, where {self._merging.trials} were identified; "
                 "give initial=, or angle= of the same recording"
             )
-        torques, angles = (rows_of(of[trial]) for of in (recorded.torques, recorded.angles))
+        angles = rows_of(recorded.angles[trial])
+        torques = rows_of(recorded.torques[trial], angles.shape[1])
         if np.array_equal(torques, pushed, equal_nan=True):
             return None, angles
         position = None if recorded.positions is None else recorded.positions[trial]
@@ -301,9 +310,10 @@ class MergedSimulated:
         return model_of(merging, values, base)
 
 
-def rows_of(channels: Sequence[Any]) -> Array:
-    """Return channels of masses as an array; those that were not measured are missing."""
-    samples = max(np.size(one) for one in channels if one is not None)
+def rows_of(channels: Sequence[Any], samples: int | None = None) -> Array:
+    """Return channels of masses as an array; those that were not measured are missing, all of them where the samples are counted."""
+    if samples is None:
+        samples = max(np.size(one) for one in channels if one is not None)
     return np.stack([np.full(samples, np.nan) if one is None else np.asarray(one, np.float64) for one in channels])
 
 

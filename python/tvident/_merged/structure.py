@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence, Sized
+from collections.abc import Mapping, Sequence, Sized
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, Literal, TypeAlias
@@ -293,7 +293,7 @@ def matrices(given: Mapping[str, Any], masses: int) -> list[Element]:
 def _links(name: str, links: Sequence[Link], masses: int) -> tuple[Link, ...]:
     """Return pairs of masses, checked."""
     found: list[Link] = []
-    if not isinstance(links, Iterable) or isinstance(links, str | bytes):
+    if not arguments.is_several(links):
         raise TypeError(
             f"{name} must be a list of pairs; got {arguments.shown(links)}; write [('base', 0), (0, 1)], say"
         )

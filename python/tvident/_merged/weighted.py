@@ -38,8 +38,10 @@ def weights_of_trials(given: Any, lengths: Sequence[int], *, several: bool) -> l
     counted = together > 0
     if not counted.any():
         arguments.weights("weights", together, together.shape)
-    mean = together[counted].mean()
-    return [one / mean for one in each]
+    # The sum of large weights would leave the range of doubles.
+    scale = float(together.max()) if together.max() > arguments.LARGEST else 1.0
+    mean = (together[counted] / scale).mean()
+    return [one / scale / mean for one in each]
 
 
 def of_core(weights: Sequence[Array] | None) -> list[Array | None] | None:
@@ -67,8 +69,12 @@ def spread(weights: Array | None) -> float:
 def _by_trial(given: Any, lengths: Sequence[int], *, several: bool) -> list[Array]:
     """Return checked weights, one array a trial."""
     is_list = isinstance(given, Sequence) and not isinstance(given, str) and len({np.size(one) for one in given}) > 1
-    alone = not is_list and arguments.any_array("weights", given).ndim == 1
-    if alone:
+    axes = 0 if is_list else arguments.any_array("weights", given).ndim
+    if not is_list and not axes:
+        raise ValueError(
+            f"weights must be one for every sample; got the single value {arguments.shown(given)}; leave them out"
+        )
+    if axes == 1:
         shape = (lengths[0],)
         if len(set(lengths)) > 1:
             raise ValueError(
@@ -77,10 +83,10 @@ def _by_trial(given: Any, lengths: Sequence[int], *, several: bool) -> list[Arra
             )
         return [_checked("weights", given, shape)] * len(lengths)
     if not several:
-        shape = np.shape(given)
+        got = "a list of several lengths" if is_list else f"shape {np.shape(given)}"
         raise ValueError(
-            f"weights must have shape ({lengths[0]},) beside one trial of several masses, since a sample has one weight; got shape {shape}"
-            "; take the least of those of its channels"
+            f"weights must have shape ({lengths[0]},) beside one trial of several masses, since a sample has one weight; got {got}; "
+            "take the least of those of its channels"
         )
     rows = list(given)
     if len(rows) != len(lengths):

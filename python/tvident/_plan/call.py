@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from numbers import Real
 
 import numpy as np
 import numpy.typing as npt
@@ -149,7 +148,7 @@ def plan_experiment(
     if result is not None:
         return _longer(result, wanted, _MORE if more is None else arguments.positive_number("more", more))
     numbers = {name: _needed(name, one) for name, one in given.items()}
-    _check_size(given | {"wanted": wanted, "angle_noise": angle_noise or None, "sample_rate": sample_rate})
+    _check_size(given | {"wanted": wanted, "angle_noise": angle_noise, "sample_rate": sample_rate})
     _check_size(of_guess)
     rate = _RATE if sample_rate is None else arguments.positive_number("sample_rate", sample_rate)
     low, high = _band(band, rate)
@@ -215,15 +214,19 @@ def _needed(name: str, value: float | None) -> float:
 def _check_size(numbers: Mapping[str, float | None]) -> None:
     """Check that powers of numbers stay within doubles: of machines they do."""
     for name, number in numbers.items():
-        if number is not None and isinstance(number, Real) and number > 0 and not _SMALLEST <= number <= 1 / _SMALLEST:
+        size = arguments.real_number(name, number) if number is not None else 0.0
+        if size > 0 and not _SMALLEST <= size <= 1 / _SMALLEST:
             raise ValueError(
                 f"{name} must be between {_SMALLEST:g} and {1 / _SMALLEST:g}; got {arguments.shown(number)}; take other units"
             )
 
 
 def _band(band: Sequence[float] | None, rate: float) -> tuple[float, float]:
-    if not isinstance(band, Sequence | np.ndarray) or isinstance(band, str) or [np.size(one) for one in band] != [1, 1]:
-        raise ValueError(f"band must be the lowest and the highest frequency; got {band}; give band=(0.5, 12), say")
+    there = isinstance(band, Sequence | np.ndarray) and not isinstance(band, str) and arguments.is_several(band)
+    if band is None or not there or len(band) != 2 or any(map(arguments.is_several, band)):  # noqa: PLR2004 - two ends
+        raise ValueError(
+            f"band must be the lowest and the highest frequency; got {arguments.shown(band)}; give band=(0.5, 12), say"
+        )
     low, high = (arguments.positive_number("band", one) for one in band)
     _check_size({"band": low})
     if not low < high < rate / 2:

@@ -21,6 +21,9 @@ PERIODS = 10
 
 _ROUNDING = 1e-9
 
+_MOST_SAMPLES = 1e12
+"""Of a torque: no memory holds more."""
+
 
 @dataclass(frozen=True)
 class ExperimentPlan:
@@ -113,6 +116,10 @@ class ExperimentPlan:
             raise ValueError(
                 f"sample_rate must be more than twice the highest frequency, {self.frequencies[-1]:.4g} Hz; got {rate:g} Hz; raise it, or "
                 "plan with a lower band"
+            )
+        if not self.duration * rate < _MOST_SAMPLES:
+            raise ValueError(
+                f"a torque must have fewer than {_MOST_SAMPLES:g} samples; got {self.duration * rate:.3g}; lower sample_rate="
             )
         time = np.arange(round(self.duration * rate)) / rate
         phases = np.random.default_rng(arguments.whole_number("seed", seed, least=0)).uniform(

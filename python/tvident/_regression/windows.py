@@ -113,7 +113,8 @@ def half_life_given(
         raise ValueError(
             f"half_life must go with alignment='trailing' or 'leading'; got {value} with 'centre'; give one of these, or no half_life"
         )
-    left = 2.0 ** (-np.arange(length) / half_life)
+    with np.errstate(under="ignore"):  # where a caller had underflows raised
+        left = 2.0 ** (-np.arange(length) / half_life)
     count = float(left.sum() ** 2 / (left @ left))
     if count <= regressors:
         raise ValueError(
@@ -142,7 +143,9 @@ def lags_given(lags: int | None, windows: RegressionWindows, *, is_correlated: b
     if lags is None:
         return None
     if not is_correlated:
-        raise ValueError(f"lags must go with covariance='hac'; got {lags} with 'classic'; give that, or no lags")
+        raise ValueError(
+            f"lags must go with covariance='hac'; got {arguments.shown(lags)} with 'classic'; give that, or no lags"
+        )
     count = arguments.whole_number("lags", lags, least=0)
     if 2 * (count + 1) > windows.rows:
         most = windows.rows // 2 - 1

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from tvident import _arguments as arguments
 from tvident._arguments import percentiles, to_digits_of, with_error
 
 Array = npt.NDArray[np.float64]
@@ -72,5 +73,5 @@ def known_name(name: str, known: Iterable[str]) -> str:
     """
     names = list(known)
     if not isinstance(name, str) or name not in names:
-        raise KeyError(f"there is no {name!r}; there are {', '.join(names)}")
+        raise KeyError(f"there is no {arguments.shown(name)}; there are {', '.join(names)}")
     return name

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from tvident._arguments import told_once
+from tvident._arguments import told_once, whole_number
 from tvident._results.curve import ExpandedParameter
 from tvident._results.estimates import Estimates
 from tvident._results.held_back import HeldBack
@@ -238,6 +238,8 @@ class Identification(Shown):
             If nothing was compared and the record is not there to do it, or an instrument was given.
         IndexError
             If there is no such record.
+        TypeError
+            If it is no whole number.
 
         See Also
         --------
@@ -256,8 +258,9 @@ class Identification(Shown):
                 )
             self._found = replace(self._found, scans=recorded.scans())
         scans = self._found.scans
+        record = whole_number("record", record)
         if not -len(scans) <= record < len(scans):
-            raise IndexError(f"record must be below {len(scans)}, the number of records; got {record}")
+            raise IndexError(f"record must be below {len(scans)}, the number of records; got {record}; count from 0")
         used = self.settings["window_length"] if self.settings["form"] == "strong" else None
         return replace(scans[record], units=self.units, used=used)
 

@@ -138,6 +138,8 @@ def scaled(array: npt.NDArray[Any], factor: float) -> npt.NDArray[Any]:
         return array
     if array.dtype.kind in "mM":
         raise UnitError("dates and durations know their unit; got time_unit too; leave it out")
+    if array.dtype.kind not in "biuf":
+        return array  # which whoever takes it refuses in words of its own
     wide = array if array.dtype == np.float64 else array.astype(np.float64)
     with np.errstate(all="ignore"):  # what leaves the range of doubles is no sample
         return np.asarray(wide * factor)

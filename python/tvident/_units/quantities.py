@@ -26,6 +26,9 @@ _WEIGHT_ON_AN_ARM = (1, 1, *NONE[2:])
 _IN_GRAVITY = dict.fromkeys(("g", "G", "gn", "g_n"), GRAVITY) | {"mg": 1e-3 * GRAVITY}
 """What accelerometers measure in, which is a mass elsewhere."""
 
+_SHOWN = 60
+"""Characters of what is no unit."""
+
 _PER_SECOND, _PER_SECOND_SQUARED, _PER_MINUTE = (0, 0, -1, *NONE[3:]), (0, 0, -2, *NONE[3:]), 1 / 60
 
 
@@ -118,7 +121,7 @@ def factor_to(system: System, quantity: str, text: str | None, *, name: str) -> 
             "angle_unit='deg' or angle_unit='gon'"
         )
     if unit is None:
-        raise UnitError(f"the unit of {name} must be one that is known; got {text!r}; {cure}")
+        raise UnitError(f"the unit of {name} must be one that is known; got {text[:_SHOWN]!r}; {cure}")
     factor = _in(unit, system.dimensions[quantity])
     if not math.isfinite(factor):
         is_electrical = quantity == "torque" and unit.dimension in {_AMPERE, _VOLT}
