@@ -5,6 +5,12 @@ use std::ops::Range;
 /// Rows of a block.
 pub(crate) const BLOCK: usize = 128;
 
+/// The regressor of the first term: inertia, damping and stiffness come before.
+const FIRST_TERM: usize = 3;
+
+/// Numbers that differ by no more, relative to their size, are rounded differently: by kernels of some thousand samples, and by weights.
+const ALIKE: f64 = 1e-9;
+
 /// One regressor in every row.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Regressor {
@@ -63,11 +69,31 @@ impl Rows {
         self.rhs.len()
     }
 
-    /// The mean square of the right-hand side.
+    /// The mean square of the right-hand side; beside an offset, of what a constant one leaves: where a sensor has its zero says nothing of the motion.
     pub(crate) fn mean_square(&self) -> f64 {
-        let used = self.rhs.iter().zip(&self.usable).filter(|(_, usable)| **usable);
-        let (sum, count) = used.fold((0.0, 0.0_f64), |(sum, count), (rhs, _)| (sum + rhs * rhs, count + 1.0));
+        let used = || (0..self.len()).filter(|&row| self.usable[row]);
+        let offset = self.offset();
+        let at = |row: usize| offset.map_or(0.0, |regressor| self.regressors[regressor].value[row]);
+        let (product, square) = used()
+            .fold((0.0, 0.0), |(product, square), row| (product + self.rhs[row] * at(row), square + at(row) * at(row)));
+        let level = if square > 0.0 { product / square } else { 0.0 };
+        let (sum, count) = used().fold((0.0, 0.0_f64), |(sum, count), row| {
+            let left = self.rhs[row] - level * at(row);
+            (sum + left * left, count + 1.0)
+        });
         sum / count.max(1.0)
+    }
+
+    /// The term that is the same in every equation of weight one.
+    fn offset(&self) -> Option<usize> {
+        (FIRST_TERM..self.regressors.len()).find(|&regressor| {
+            let column = &self.regressors[regressor].value;
+            let mut sizes = (0..column.len())
+                .filter(|&row| self.usable[row] && self.root(row) > 0.0)
+                .map(|row| column[row] / self.root(row));
+            let first = sizes.next().filter(|size| *size != 0.0 && column.len() == self.len());
+            first.is_some_and(|size| sizes.all(|one| (one - size).abs() <= ALIKE * size.abs()))
+        })
     }
 
     /// The mean square of a regressor over all rows.
@@ -170,6 +196,41 @@ pub(crate) fn joints(stretches: &[Range<usize>]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Three regressors of a motion, and a term.
+    fn rows_with(term: Vec<f64>, rhs: Vec<f64>) -> Rows {
+        let of = |value| Regressor { value, ..Regressor::default() };
+        let motion = (1..4).map(|one| of(rhs.iter().map(|value| value * f64::from(one)).collect()));
+        Rows { usable: vec![true; rhs.len()], regressors: motion.chain([of(term)]).collect(), rhs, ..Rows::default() }
+    }
+
+    #[test]
+    fn a_torque_is_measured_from_its_mean_where_there_is_an_offset() {
+        let torque: Vec<f64> = vec![2.0, -1.0, 4.0, -5.0, 3.0, -3.0];
+        let square = torque.iter().map(|value| value * value).sum::<f64>() / 6.0;
+        let moved = |by: f64| torque.iter().map(|value| value + by).collect::<Vec<_>>();
+        for by in [0.0, 8.0, -1e3] {
+            let found = rows_with(vec![0.25; 6], moved(by)).mean_square();
+            assert!((found - square).abs() < 1e-9 * square, "{by}: {found}");
+        }
+        // What is no offset explains none, and without equations nothing is recorded.
+        let other = rows_with(vec![1.0, 1.0, 1.0, -1.0, 1.0, 1.0], moved(8.0)).mean_square();
+        assert_eq!(other, moved(8.0).iter().map(|value| value * value).sum::<f64>() / 6.0);
+        let mut none = rows_with(vec![0.25; 6], moved(8.0));
+        none.exclude(0..6);
+        assert_eq!(none.mean_square(), 0.0);
+    }
+
+    #[test]
+    fn an_offset_is_known_among_equations_of_other_weights() {
+        let torque = [2.0, -1.0, 4.0, -5.0, 3.0, -3.0];
+        let of = |by: f64| {
+            let mut rows = rows_with(vec![0.3; 6], torque.iter().map(|value| value + by).collect());
+            rows.weigh(vec![1.0, 0.1, 0.7, 3.0, 0.0, 1.3]);
+            rows.mean_square()
+        };
+        assert!((of(8.0) - of(0.0)).abs() < 1e-9 * of(0.0), "{} {}", of(8.0), of(0.0));
+    }
 
     #[test]
     fn rows_that_were_set_aside_come_back_as_they_were() {
