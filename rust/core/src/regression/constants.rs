@@ -243,6 +243,27 @@ mod tests {
     }
 
     #[test]
+    fn weights_do_not_depend_on_the_unit_of_the_torque() {
+        let mut plain = rows(ROWS, steps, 0.1);
+        for (row, more) in random(5, SPAN).iter().enumerate() {
+            plain.rhs[7 * SPAN + row] += 3.0 * more;
+        }
+        let found = |scale: f64| {
+            let mut rows = plain.clone();
+            rows.rhs.iter_mut().for_each(|rhs| *rhs *= scale);
+            pool(&windows(&rows), 0..20, white(0.01 * scale * scale), Instructions::Scalar).expect("constants")
+        };
+        let one = found(1.0);
+        assert!(one.weights[7] < 0.5);
+        for scale in [2.0_f64.powi(-20), 1024.0, 2.0_f64.powi(20)] {
+            let other = found(scale);
+            assert_eq!(other.weights, one.weights, "{scale}");
+            let values: Vec<f64> = other.values.iter().map(|value| value / scale).collect();
+            assert_eq!(values, one.values, "{scale}");
+        }
+    }
+
+    #[test]
     fn constants_come_from_the_windows_that_are_asked_for() {
         let mut rows = rows(ROWS, steps, 0.0);
         let first: Vec<f64> = rows.regressors[1].value[..10 * SPAN].to_vec();

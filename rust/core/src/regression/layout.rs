@@ -98,7 +98,8 @@ impl Fields {
         self.left(self.layout.constant, self.layout.constant) + 1 + constant
     }
 
-    /// The share of the rows' noise that the local unknowns absorb: the expected residual is smaller by it.
+    /// What the local unknowns absorb of the rows' noise, as a sum of squares: the expected residual is smaller by it. Infinite where the noise of rows is not
+    /// known.
     #[inline(always)]
     pub(crate) fn freedom(self) -> usize {
         self.norm(self.layout.constant)

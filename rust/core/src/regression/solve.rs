@@ -89,7 +89,7 @@ pub(crate) fn solve(
     errors(layout, summary, factor, pivots, residual, variance, inverse, column, fields);
 }
 
-/// Covariance of the local unknowns, the degrees of freedom that they take, and their condition number.
+/// Covariance of the local unknowns, what they take up of the rows' noise, and their condition number.
 #[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "the parts of one scratch")]
 fn errors(
@@ -137,7 +137,7 @@ fn errors(
                 fields[names.covariance(i, j)] = variance * inverse_normal(inverse, local, i, j);
             }
         }
-        fields[names.freedom()] = Packet::splat(local as f64);
+        fields[names.freedom()] = Packet::splat(f64::INFINITY);
         return;
     };
     // N = R⁻ᵀ M R⁻¹ is the noise in the coordinates of the factor; its trace is the expected reduction of the residual.
@@ -257,7 +257,7 @@ mod tests {
         }
         // Two unknowns take up the noise of two rows.
         assert_near(known[names.freedom()], 0.6, ROUNDING);
-        assert_near(ordinary[names.freedom()], 2.0, 0.0);
+        assert_eq!(ordinary[names.freedom()], f64::INFINITY);
         let condition = (2.0 * (a * inverse[0][0] + d * inverse[1][1])).sqrt();
         assert_near(known[names.condition()], condition, ROUNDING);
     }
