@@ -11,15 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _core
+from tvident._clocks.gaps import FEW, LONGEST, USUAL, beyond, gaps_of, is_worth, mean_of, take_many, taken
 from tvident._clocks.grid import Numbers
+from tvident._clocks.long_gaps import over_long
 from tvident._clocks.passed import Passed
 from tvident._clocks.timed import Timed
 
 _ORDERS = (1, 3, 5)
 """What there is to choose from."""
-
-_MOST_LOST = 2
-"""Samples in a row that may be bridged, at most."""
 
 LEAST_BRIDGED = 1.5
 """Periods: steps up to this are no gaps, whatever the channels do."""
@@ -30,14 +29,8 @@ _LOOKED_AT, _RECORDS = 1 << 13, 4
 _APART = 8
 """Samples between those that are left out, for each of them."""
 
-_TEST_FUNCTION = 32
-"""Samples of a usual test function: a gap that is not bridged takes as many equations."""
-
-_FEW = 0.1
-"""Part of the equations, as more of those that are left: if gaps take less than this, they are left out."""
-
-_SEEN, _LEAST = 1e-3, 1e-24
-"""What splines may miss of a channel's root mean square whatever its noise is; of its mean square, what is rounding."""
+_LEAST = 1e-24
+"""Of the mean square of a channel: what is rounding."""
 
 _Rows = npt.NDArray[np.float64]
 
@@ -74,22 +67,22 @@ def bridge_of(channels: Mapping[str, npt.NDArray[np.number]], order: int | None 
     every = np.concatenate([_rows_of(values) for values in channels.values()])
     first = max(0, (every.shape[1] - _LOOKED_AT) // 2)
     rows = every[:, first : first + _LOOKED_AT]
-    squares = np.array([_mean(row**2) for row in rows])
+    squares = np.array([mean_of(row**2) for row in rows])
     missed = {one: _missed(rows, one, 1) for one in (_ORDERS if order is None else (order,))}
     known = [found + _LEAST * squares + np.finfo(float).tiny for found, _ in missed.values()]
     best = list(missed)[int(np.argmin([np.nansum(np.log(one)) for one in known]))]
+    # Not finite of a record of which hardly a window is whole: then nothing is an error of the splines.
     variance = np.array([_core.noise(np.ascontiguousarray(row), 0.0)[0].sigma ** 2 for row in rows])
-    # A record of which hardly a window is whole: then nothing is an error of the splines.
+    long = over_long(every, rows, variance, tuple(missed))
+    if long is not None:
+        return Bridge(long[0], long[1] + 1.0)
     variance = np.where(np.isfinite(variance), variance, missed[best][0] / missed[best][1])
-    for lost in range(1, _MOST_LOST + 1):
+    for lost in range(1, USUAL + 1):
         wrong, of_noise = missed[best] if lost == 1 else _missed(rows, best, lost)
-        beyond = np.maximum(wrong - variance * of_noise, 0.0)
-        gaps = np.array([_gaps(row, lost) for row in every])
-        costs = lost * gaps * beyond
-        is_worth = (beyond <= _SEEN**2 * squares) | (costs <= variance * np.expm1(_TEST_FUNCTION * gaps))
-        if not (is_worth | ~np.isfinite(wrong)).all():
+        gaps = np.array([gaps_of(row, lost, lost) for row in every])
+        if not (is_worth(lost, gaps, beyond(wrong, of_noise, variance), variance, squares) | ~np.isfinite(wrong)).all():
             return Bridge(best, max(float(lost), LEAST_BRIDGED))
-    return Bridge(best, float(_MOST_LOST + 1))
+    return Bridge(best, float(USUAL + 1))
 
 
 def _rows_of(values: npt.NDArray[np.number]) -> _Rows:
@@ -106,20 +99,8 @@ def _missed(rows: _Rows, order: int, lost: int) -> tuple[Numbers, float]:
     resampling = _core.Resampling(places, samples, order=order, bridged=lost + 1.0)
     whole = np.concatenate([rows, noise])
     found = resampling.onto_grid(np.where(left_out, np.nan, whole), workers=1)
-    wrong = np.array([_mean(row) for row in (found - whole)[:, left_out] ** 2])
+    wrong = np.array([mean_of(row) for row in (found - whole)[:, left_out] ** 2])
     return wrong[:-1], float(wrong[-1])
-
-
-def _gaps(row: Numbers, lost: int) -> float:
-    """Return how many gaps of so many samples there are for each sample."""
-    there = np.flatnonzero(np.isfinite(row))
-    return int(np.count_nonzero(np.diff(there) == lost + 1)) / max(row.size, 1)
-
-
-def _mean(values: Numbers) -> float:
-    """Return the mean of what is known; NaN where nothing is."""
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if known.size else math.nan
 
 
 @dataclass(frozen=True)
@@ -206,7 +187,7 @@ def longest_bridged_in(values: npt.NDArray[np.number], order: int) -> float:
     """
     row = _records(values)[0]
     bridge = bridge_of({"": row}, order) if _saved(row) > 0 else None
-    return bridge.longest if bridge is not None and bridge.longest >= _MOST_LOST else 0.0
+    return bridge.longest if bridge is not None and bridge.longest >= USUAL else 0.0
 
 
 def _records(values: npt.NDArray[np.number]) -> _Rows:
@@ -219,10 +200,10 @@ def _records(values: npt.NDArray[np.number]) -> _Rows:
 def _bridge_of_record(channels: Mapping[str, Numbers], given: Bridge | None) -> Bridge | None:
     """Return how short gaps of a record are bridged; None where there are none, or they are better left out."""
     some = {name: row for name, row in channels.items() if _saved(row) > 0}
-    if not some or (given is None and all(_saved(row) < _FEW for row in some.values())):
+    if not some or (given is None and max(map(_saved, some.values())) < FEW):
         return None
     bridge = given or bridge_of(some)
-    return bridge if bridge.longest >= _MOST_LOST else None
+    return bridge if bridge.longest >= USUAL else None
 
 
 def _filled(row: Numbers, bridge: Bridge | None, workers: int | None) -> Numbers:
@@ -241,8 +222,9 @@ def _resampling(places: Numbers, samples: int, bridge: Bridge | None) -> _core.R
 
 
 def _saved(row: Numbers) -> float:
-    """Return how many equations short gaps take, for each that they leave."""
-    return math.expm1(_TEST_FUNCTION * sum(_gaps(row, lost) for lost in range(1, _MOST_LOST + 1)))
+    """Return how many equations short gaps take, for each that they leave; all gaps, where long ones take many."""
+    longest = LONGEST if take_many(gaps_of(row, USUAL + 1, LONGEST)) else USUAL
+    return taken(gaps_of(row, 1, longest))
 
 
 def _earlier(settings: Mapping[str, object] | None) -> Bridge | None:

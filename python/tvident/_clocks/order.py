@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident import _core
+from tvident._clocks.gaps import are_followed, beyond, is_worth, take_many
 from tvident._clocks.grid import Grid, Numbers
 from tvident._clocks.missing import LEAST_BRIDGED
 
@@ -69,10 +70,13 @@ def longest_bridged(grid: Grid, channels: Mapping[str, npt.NDArray[np.number]], 
     """Return the longest step in periods that a spline may go over: as long as it predicts samples that are left out there.
 
     Everywhere in the middle of the record some samples are left out, so that steps become as long. What they are missed by is compared with
-    what noise alone is. Where no step is longer than those that are no gaps anyway, and nothing is missing, nothing is asked.
+    what noise alone is. Longer steps are gaps, unless they take many equations, and splines add less to the variance of these than
+    is lost with all over such a step. Where no step is longer than those that are no gaps anyway, and nothing is missing,
+    nothing is asked.
     """
     nothing_lost = all(np.isfinite(values).all() for values in channels.values())
-    if nothing_lost and float(np.diff(grid.places).max()) <= LEAST_BRIDGED:
+    steps = np.diff(grid.places)
+    if nothing_lost and float(steps.max()) <= LEAST_BRIDGED:
         return LEAST_BRIDGED
     middle = Middle.of(grid, channels)
     every = middle.resampled(order, grid.bridged)
@@ -80,13 +84,24 @@ def longest_bridged(grid: Grid, channels: Mapping[str, npt.NDArray[np.number]], 
     change = middle.beside_noise(every - judge)
     noise = change[:-1] / change[-1] if change[-1] > 0 else np.zeros(change.size - 1)
     squares = middle.mean_square(every)
+    usual = 0.0
     for lost in range(1, math.floor(grid.bridged)):
         kept = np.arange(middle.places.size) % (_APART * lost) >= lost
         holed = Middle(middle.places[kept], middle.samples, middle.rows[:, kept])
         wrong = middle.beside_noise(_missed(holed, middle, kept, order))
-        if (wrong[:-1] > _EXPLAINED * noise * wrong[-1] + _SEEN**2 * squares).any():
-            return max(float(lost), LEAST_BRIDGED)
-    return grid.bridged
+        if not usual and (wrong[:-1] <= _EXPLAINED * noise * wrong[-1] + _SEEN**2 * squares).all():
+            continue
+        longest = max(float(lost), LEAST_BRIDGED)
+        usual = usual or longest
+        bias = beyond(wrong[:-1], wrong[-1], noise)
+        gaps = np.full(bias.size, np.count_nonzero((steps > longest) & (steps <= lost + 1)) / grid.places.size)
+        if not (is_worth(lost, gaps, bias, noise, squares) & are_followed(bias, squares)).all():
+            break
+    else:
+        longest = grid.bridged
+    usual = usual or longest
+    saved = np.count_nonzero((steps > usual) & (steps <= longest)) / grid.places.size
+    return longest if take_many(saved) else usual
 
 
 def _missed(holed: Middle, middle: Middle, kept: npt.NDArray[np.bool_], order: int) -> Numbers:
