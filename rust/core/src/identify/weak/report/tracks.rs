@@ -7,7 +7,7 @@ use crate::exec::stages::Stages;
 use crate::identify::weak::decided::{Decided, rows_of};
 use crate::identify::weak::outside_mask::Outside;
 use crate::identify::weak::session::Session;
-use crate::inference::carried_on::far_from_equations;
+use crate::inference::carried_on::{add_unknown_changes, far_from_equations};
 use crate::inference::window_averaging::average;
 use crate::regression::centred_windows::every_window;
 use crate::regression::constants::Expected;
@@ -143,7 +143,11 @@ impl Session<'_, '_, '_> {
             for other in 0..=unknown {
                 let squared =
                     averages.errors[unknown].iter().map(|error| if other == unknown { error * error } else { 0.0 });
-                covariances.push(squared.collect());
+                let mut squared: Vec<f64> = squared.collect();
+                if other == unknown {
+                    add_unknown_changes(usable, &averages.values[unknown], &mut squared);
+                }
+                covariances.push(squared);
             }
         }
         Ok(Tracks {
