@@ -319,7 +319,7 @@ def _links(name: str, links: Sequence[Link], masses: int) -> tuple[Link, ...]:
 
 def _joint_terms(terms: Any, masses: int) -> tuple[tuple[str, Link], ...]:
     """Return terms and what each acts between, checked."""
-    if not isinstance(terms, Iterable) or isinstance(terms, str | bytes):
+    if not arguments.is_several(terms):
         raise TypeError(
             f"terms of a chain must be a list of pairs; got {arguments.shown(terms)}; write [('coulomb', (0, 1))], say"
         )
