@@ -17,7 +17,7 @@ pub(crate) const FRICTION: &str = "coulomb";
 const SPRING: &str = "cubic";
 const DRAG: &str = "quadratic_drag";
 
-/// Columns whose cosine is as large are of one term, which was given.
+/// Columns whose cosine is as large are of one term.
 const SAME: f64 = 0.9;
 
 /// Samples of every trial.
@@ -78,11 +78,18 @@ impl MergedSession<'_, '_, '_> {
                 add(&mut columns[*place], *sign, own);
             }
         }
-        for ((motion, missing, _), regressor) in possible.into_iter().zip(columns) {
-            if !self.is_given(motion.mass, &regressor) {
+        for (place, (motion, missing, _)) in possible.iter().enumerate() {
+            // Against a base that hardly moves a mass moves as it does on its own: a structure says which of them is held.
+            let is_against = possible.iter().zip(&columns).any(|((other, same, _), column)| {
+                other.mass == motion.mass
+                    && same == missing
+                    && other.against.is_some()
+                    && are_alike(column, &columns[place])
+            });
+            if (motion.against.is_some() || !is_against) && !self.is_given(motion.mass, &columns[place]) {
                 let column = self.all.rows.regressors.len();
-                candidates.push(PossibleTerm { motion, missing, column });
-                self.all.rows.regressors.push(regressor);
+                candidates.push(PossibleTerm { motion: *motion, missing: *missing, column });
+                self.all.rows.regressors.push(columns[place].clone());
             }
         }
         Ok(candidates)
@@ -185,4 +192,11 @@ fn add(column: &mut Regressor, sign: f64, of_equation: Regressor) {
         *column = Regressor { value: vec![0.0; of_equation.value.len()], ..of_equation.clone() };
     }
     column.value.iter_mut().zip(of_equation.value).for_each(|(sum, value)| *sum += sign * value);
+}
+
+/// Whether two columns are nearly multiples of each other.
+fn are_alike(one: &Regressor, other: &Regressor) -> bool {
+    let product = |one: &[f64], other: &[f64]| -> f64 { one.iter().zip(other).map(|(a, b)| a * b).sum() };
+    let sizes = product(&one.value, &one.value) * product(&other.value, &other.value);
+    product(&one.value, &other.value).abs() > SAME * sizes.sqrt()
 }

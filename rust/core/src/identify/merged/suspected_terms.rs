@@ -8,7 +8,7 @@ use crate::identify::merged::possible_terms::{FRICTION, MotionOf, PossibleTerm};
 use crate::identify::merged::session::MergedSession;
 use crate::identify::merged::shown::{NoiseOfRows, SHOWN};
 use crate::identify::weak::shown_noise::MORE;
-use crate::inference::missing_terms::Suspect;
+use crate::inference::missing_terms::{CONSPICUOUS, Suspect};
 use crate::regression::fit::Fit;
 use crate::regression::problem::Correlated;
 use crate::regression::residuals::residuals;
@@ -16,7 +16,7 @@ use crate::regression::residuals::residuals;
 /// The part of the mean square of an equation's torque that a term must have: what windows cannot follow looks like a little of anything.
 const LEAST_PART: f64 = 1e-4;
 
-/// Standard errors from which on a candidate stands beside the others: of many that are alike none is known.
+/// Standard errors below which a candidate is hardly more than nothing.
 const PERHAPS: f64 = 2.0;
 
 /// Terms that are suspected.
@@ -52,10 +52,12 @@ impl MergedSession<'_, '_, '_> {
         let rows = &self.all.rows;
         let judged = noise.judged(rows, fitted, correlated, self.options.instructions);
         let mut factors = judged.factors(&columns(&candidates), &mut self.stages)?.unwrap_or_default();
-        let stand: Vec<bool> = factors.iter().map(|(value, error)| value.abs() >= PERHAPS * error).collect();
-        if stand.contains(&false) && stand.contains(&true) {
-            let mut stands = stand.iter();
-            candidates.retain(|_| stands.next().copied().unwrap_or(false));
+        while let Some(stand) = standing(&factors) {
+            let mut stands = stand.into_iter();
+            candidates.retain(|_| stands.next().unwrap_or(false));
+            if candidates.is_empty() {
+                return Ok(self.none_beyond(first));
+            }
             factors = judged.factors(&columns(&candidates), &mut self.stages)?.unwrap_or_default();
         }
         let told: Vec<(&PossibleTerm, Suspect)> = candidates
@@ -84,6 +86,12 @@ impl MergedSession<'_, '_, '_> {
         Ok(found)
     }
 
+    /// No terms, and the columns of candidates gone.
+    fn none_beyond(&mut self, first: usize) -> SuspectedTerms {
+        self.all.rows.regressors.truncate(first);
+        SuspectedTerms::default()
+    }
+
     /// The mean square of a term with a factor over that of the torque, in the rows of its equations.
     fn part_of(&self, one: &PossibleTerm, factor: f64) -> f64 {
         let (rows, equations) = (&self.all.rows, self.merged.equations());
@@ -98,6 +106,19 @@ impl MergedSession<'_, '_, '_> {
     }
 }
 
+/// Which candidates stay beside each other; `None` if all do. All that are hardly more than nothing go at once, then the least of those that are not
+/// conspicuous, one by one: of two that are alike, as with a base that hardly moves, neither is known beside the other.
+fn standing(factors: &[(f64, f64)]) -> Option<Vec<bool>> {
+    let sizes: Vec<f64> = factors.iter().map(|(value, error)| value.abs() / error).collect();
+    let nothing = sizes.iter().any(|size| size.is_nan() || *size < PERHAPS);
+    let least = sizes.iter().copied().fold(f64::INFINITY, f64::min);
+    match (nothing, least < CONSPICUOUS) {
+        (true, _) => Some(sizes.iter().map(|size| *size >= PERHAPS).collect()),
+        (false, true) => Some(sizes.iter().map(|size| *size > least).collect()),
+        (false, false) => None,
+    }
+}
+
 fn columns(candidates: &[PossibleTerm]) -> Vec<usize> {
     candidates.iter().map(|one| one.column).collect()
 }
@@ -109,4 +130,20 @@ fn drives(suspect: &Suspect) -> bool {
 
 pub(crate) fn sum_of_squares((left, usable): &(Vec<f64>, Vec<bool>)) -> f64 {
     left.iter().zip(usable).filter(|(_, usable)| **usable).map(|(left, _)| left * left).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_least_of_what_is_not_conspicuous_goes_first_and_what_is_nothing_at_once() {
+        assert_eq!(
+            standing(&[(9.0, 1.0), (1.9, 1.0), (-3.0, 1.0), (f64::NAN, 1.0)]),
+            Some(vec![true, false, true, false])
+        );
+        assert_eq!(standing(&[(9.0, 1.0), (4.0, 1.0), (-3.0, 1.0)]), Some(vec![true, true, false]));
+        assert_eq!(standing(&[(9.0, 1.0), (-5.0, 1.0)]), None);
+        assert_eq!(standing(&[]), None);
+    }
 }
