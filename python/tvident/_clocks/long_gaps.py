@@ -19,6 +19,9 @@ _LENGTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24, LONGEST)
 _APART = 8
 """Stretches between those that are left out, for each of them."""
 
+_ALIKE = 0.5
+"""Part of the samples that one channel lacks that others lack at least: what splines smooth then, they smooth of the whole equation."""
+
 _LEAST = 1e-24
 """Of the mean square of a channel: what is rounding."""
 
@@ -41,7 +44,8 @@ def over_long(every: _Rows, rows: _Rows, variance: Numbers, orders: Sequence[int
     orders : sequence of int
         What there is to choose from.
     """
-    if not take_many(_of_any(every, USUAL + 1, LONGEST)):
+    # A channel that is bridged alone is smoothed alone.
+    if not _are_alike(every) or not take_many(_of_any(every, USUAL + 1, LONGEST)):
         return None
     lengths = [0]
     for longest in _LENGTHS:
@@ -54,14 +58,14 @@ def over_long(every: _Rows, rows: _Rows, variance: Numbers, orders: Sequence[int
     among = [_in_gaps(rows, *one) for one in classes]
     changes = {one: [_changes(across[one], across[one + 2], there) for there in among] for one in orders}
     missed = {one: [_missed_over(rows, one, longest) for _, longest in classes] for one in orders}
-    # Of a record of which hardly a window is whole: at most what single samples are missed by.
+    # Of a record of which hardly a window is whole nobody knows what of it is noise: at most what single samples are missed by, at least nothing.
     most = np.min([found[0][0] / found[0][1] for found in missed.values()], axis=0)
+    surely = np.where(np.isfinite(variance), variance, 0.0)
     variance = np.where(np.isfinite(variance), variance, most)
     squares = np.array([mean_of(row**2) for row in rows])
     biases = {
         one: [
-            np.fmin(*(beyond(*wrong, variance) for wrong in both))
-            for both in zip(changes[one], missed[one], strict=True)
+            np.fmin(*(beyond(*wrong, surely) for wrong in both)) for both in zip(changes[one], missed[one], strict=True)
         ]
         for one in orders
     }
@@ -91,6 +95,12 @@ def _of_any(every: _Rows, fewest: int, most: int) -> float:
         steps = np.diff(known)
         starts[known[:-1][(steps > fewest) & (steps <= most + 1)]] = True
     return float(np.mean(starts))
+
+
+def _are_alike(every: _Rows) -> bool:
+    """Tell whether all channels lack about as many samples."""
+    missing = np.mean(~np.isfinite(every), axis=1)
+    return bool(missing.min() >= _ALIKE * missing.max())
 
 
 def _missed_over(rows: _Rows, order: int, lost: int) -> tuple[Numbers, Numbers]:

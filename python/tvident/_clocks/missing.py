@@ -52,7 +52,9 @@ class Bridge:
 
 
 @np.errstate(all="ignore")
-def bridge_of(channels: Mapping[str, npt.NDArray[np.number]], order: int | None = None) -> Bridge:
+def bridge_of(
+    channels: Mapping[str, npt.NDArray[np.number]], order: int | None = None, *, alone: bool = False
+) -> Bridge:
     """Return how short gaps of channels on a uniform grid are bridged; NaN is missing.
 
     Samples are left out, as many in a row as are missing. What splines miss them by beyond what the noise makes that is an error of theirs.
@@ -63,6 +65,8 @@ def bridge_of(channels: Mapping[str, npt.NDArray[np.number]], order: int | None 
     channels : mapping of str to ndarray, shape (*, n)
     order : int, optional
         Of the splines, where it is given.
+    alone : bool
+        Whether other channels lack nothing: what splines smooth over long gaps, they smooth of one side of the equation then.
     """
     every = np.concatenate([_rows_of(values) for values in channels.values()])
     first = max(0, (every.shape[1] - _LOOKED_AT) // 2)
@@ -73,7 +77,7 @@ def bridge_of(channels: Mapping[str, npt.NDArray[np.number]], order: int | None 
     best = list(missed)[int(np.argmin([np.nansum(np.log(one)) for one in known]))]
     # Not finite of a record of which hardly a window is whole: then nothing is an error of the splines.
     variance = np.array([_core.noise(np.ascontiguousarray(row), 0.0)[0].sigma ** 2 for row in rows])
-    long = over_long(every, rows, variance, tuple(missed))
+    long = None if alone else over_long(every, rows, variance, tuple(missed))
     if long is not None:
         return Bridge(long[0], long[1] + 1.0)
     variance = np.where(np.isfinite(variance), variance, missed[best][0] / missed[best][1])
@@ -154,7 +158,11 @@ def bridged(
         return None
     rows = {name: _records(values) for name, values in gappy.items()}
     given, records = _earlier(earlier), len(next(iter(rows.values())))
-    bridges = [_bridge_of_record({name: row[place] for name, row in rows.items()}, given) for place in range(records)]
+    alone = len(gappy) < len(channels)
+    bridges = [
+        _bridge_of_record({name: row[place] for name, row in rows.items()}, given, alone=alone)
+        for place in range(records)
+    ]
     longest = max((one.longest for one in bridges if one is not None), default=0.0)
     if not longest:
         return None
@@ -186,7 +194,7 @@ def longest_bridged_in(values: npt.NDArray[np.number], order: int) -> float:
     However rare they are: on the grid of a faster channel a gap is long, and so are test functions.
     """
     row = _records(values)[0]
-    bridge = bridge_of({"": row}, order) if _saved(row) > 0 else None
+    bridge = bridge_of({"": row}, order, alone=True) if _saved(row) > 0 else None
     return bridge.longest if bridge is not None and bridge.longest >= USUAL else 0.0
 
 
@@ -197,12 +205,12 @@ def _records(values: npt.NDArray[np.number]) -> _Rows:
     return rows
 
 
-def _bridge_of_record(channels: Mapping[str, Numbers], given: Bridge | None) -> Bridge | None:
+def _bridge_of_record(channels: Mapping[str, Numbers], given: Bridge | None, *, alone: bool) -> Bridge | None:
     """Return how short gaps of a record are bridged; None where there are none, or they are better left out."""
     some = {name: row for name, row in channels.items() if _saved(row) > 0}
     if not some or (given is None and max(map(_saved, some.values())) < FEW):
         return None
-    bridge = given or bridge_of(some)
+    bridge = given or bridge_of(some, alone=alone or len(some) < len(channels))
     return bridge if bridge.longest >= USUAL else None
 
 
