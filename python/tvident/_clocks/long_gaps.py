@@ -58,7 +58,7 @@ def over_long(every: _Rows, rows: _Rows, variance: Numbers, orders: Sequence[int
     among = [_in_gaps(rows, *one) for one in classes]
     changes = {one: [_changes(across[one], across[one + 2], there) for there in among] for one in orders}
     missed = {one: [_missed_over(rows, one, longest) for _, longest in classes] for one in orders}
-    # Of a record of which hardly a window is whole nobody knows what of it is noise: at most what single samples are missed by, at least nothing.
+    # Of a record of which hardly a window is whole nobody knows what is noise: at most what single samples are missed by, at least nothing.
     most = np.min([found[0][0] / found[0][1] for found in missed.values()], axis=0)
     surely = np.where(np.isfinite(variance), variance, 0.0)
     variance = np.where(np.isfinite(variance), variance, most)
