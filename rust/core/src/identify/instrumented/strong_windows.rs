@@ -63,7 +63,9 @@ pub(crate) fn strong(
         for (one, bias) in bias.iter().enumerate() {
             found.widen(one, bias * bias);
         }
-        let is_better = |sharper: &TwoStage| sharper.size() < found.size() && sharper.strength >= WEAK_INSTRUMENT;
+        // The first stage is weak where polynomials are too long to leave anything, too.
+        let enough = WEAK_INSTRUMENT.min(found.strength);
+        let is_better = |sharper: &TwoStage| sharper.size() < found.size() && sharper.strength >= enough;
         if is_small || shorter.is_none() || !sharper.found.as_ref().is_some_and(is_better) {
             break;
         }
@@ -72,10 +74,10 @@ pub(crate) fn strong(
     Ok((window.both, window.found))
 }
 
-/// An odd length of half as many samples, if polynomials of the order can be fitted to them.
+/// An odd length of half as many samples, if polynomials of the order, and sharper ones to compare them with, can be fitted to them.
 fn half(length: usize, order: usize) -> Option<usize> {
     let shorter = (length / 2) | 1;
-    (shorter < length && shorter >= order + 2).then_some(shorter)
+    (shorter < length && shorter >= order + 4).then_some(shorter)
 }
 
 fn of_window(

@@ -11,12 +11,12 @@ use crate::identify::weak::lag::Followed;
 use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::{CONSPICUOUS, JudgedTerm, Missing, Suspect};
-use crate::record::derived::Interpolated;
+use crate::record::derived::{Interpolated, Shifted};
 use crate::regression::fit::Fit;
 use crate::regression::limits::NEGLIGIBLE;
 use crate::regression::problem::Correlated;
 use crate::regression::subsample::{holds, more_stretches_of_rows, stretches_of_rows, thinned_column, thinned_rows};
-use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows};
+use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows, mean};
 
 /// Where next to nothing is left to explain, a lag is none that is below a fifth of what a drive makes that holds each torque for a sample.
 const LEAST_LAG: f64 = 0.1;
@@ -230,8 +230,10 @@ impl Session<'_, '_, '_> {
     ) -> Result<Vec<Regressor>, Error> {
         let (velocity, samples) = (weak.plain_column(1), self.record.angle.len());
         let velocity = Interpolated { values: &velocity, first: weak.first, stride: weak.stride, samples };
-        let Record { angle, torque, .. } = self.record;
-        let mapped: Vec<_> = candidates.iter().map(|missing| missing.samples(angle, &velocity, torque)).collect();
+        // Powers of a torque that has a mean are the torque itself, mostly, which is like whatever windows do not follow.
+        let torque = Shifted { channel: self.record.torque, zero: self.torque_zero() };
+        let angle = self.record.angle;
+        let mapped: Vec<_> = candidates.iter().map(|missing| missing.samples(angle, &velocity, &torque)).collect();
         let terms = candidates.iter().zip(&mapped).map(|(missing, mapped)| match (missing, mapped) {
             (Missing::Lag, _) => TermSamples::TorqueRate,
             (Missing::Resonance, _) => TermSamples::TorqueCurvature,
@@ -245,6 +247,12 @@ impl Session<'_, '_, '_> {
         let (function, delta, workers) = (weak.function, self.options.delta, self.stages.workers);
         let more = self.stages.stage(|watch| WeakRows::build(&record, function, delta, stretches, workers, watch))?;
         Ok(more.rows.regressors.into_iter().skip(3).collect())
+    }
+
+    /// What powers of the torque are taken from: its mean beside an offset, which holds the rest of them with what all parameters share.
+    pub(crate) fn torque_zero(&self) -> f64 {
+        let has_offset = self.record.terms.iter().any(|term| matches!(term, TermSamples::One));
+        if has_offset { mean(self.record.torque) } else { 0.0 }
     }
 
     /// What may be missing: what the equation does not hold already, first that beside which the torque tells nothing.

@@ -118,7 +118,8 @@ impl Session<'_, '_, '_> {
         }
         let covariance = if shown.variance() > known.variance() { shown } else { known };
         let problem = Problem { correlated: Some(model.correlated(rows, &covariance, &mut self.stages)?), ..problem };
-        let shared = shared(weak, &regressors, candidates, expected.torque.min(covariance.variance()));
+        let noise = expected.torque.min(covariance.variance());
+        let shared = shared(weak, &regressors, candidates, (noise, self.torque_zero()));
         let lag = candidates.iter().position(|&one| one == Missing::Lag);
         let mut suspects = Vec::new();
         for (place, &missing) in candidates.iter().enumerate().filter(|(_, missing)| missing.is_of_torque()) {
@@ -166,8 +167,8 @@ impl Session<'_, '_, '_> {
     }
 }
 
-/// The covariance of a row's noise with that of each regressor.
-fn shared(weak: &WeakRows, regressors: &Range<usize>, candidates: &[Missing], torque: f64) -> Vec<f64> {
+/// The covariance of a row's noise with that of each regressor, from the variance of the torque's noise and what its powers are taken from.
+fn shared(weak: &WeakRows, regressors: &Range<usize>, candidates: &[Missing], (torque, zero): (f64, f64)) -> Vec<f64> {
     let scale: f64 = weak.torque.iter().sum();
     let mean = |column: &[f64]| column.iter().sum::<f64>() / (scale * weak.rows.len() as f64);
     let square = candidates.iter().position(|&one| one == Missing::TorqueSquare);
@@ -175,7 +176,7 @@ fn shared(weak: &WeakRows, regressors: &Range<usize>, candidates: &[Missing], to
     let of = |missing: &Missing| match missing {
         Missing::Resonance => -shared_noise(weak, torque),
         // The slopes of both powers, in the mean.
-        Missing::TorqueSquare => 2.0 * mean(&weak.rows.rhs) * torque,
+        Missing::TorqueSquare => 2.0 * (mean(&weak.rows.rhs) - zero) * torque,
         Missing::TorqueCube => 3.0 * squares * torque,
         Missing::Term(_) | Missing::Lag | Missing::Gain => 0.0,
     };
