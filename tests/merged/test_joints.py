@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ def velocity(angle: Array) -> Array:
     return np.asarray(savgol_filter(angle, 41, 5, deriv=1, delta=1e-3))
 
 
-SHAPES = {
+SHAPES: dict[str, Callable[[Array], Array]] = {
     "coulomb": lambda angle: np.sign(velocity(angle)),
     "cubic": lambda angle: (angle / angle.std()) ** 3,
     "quadratic_drag": lambda angle: velocity(angle) * np.abs(velocity(angle)) / velocity(angle).std() ** 2,
