@@ -126,8 +126,7 @@ def _tested(result: Any) -> list[str]:
 
 def _channels_of(part: Part, masses: int, period: float) -> list[str]:
     """Return what to do about channels that a recorder spoilt, that are late, or whose gain is wrong."""
-    numbers, found = part.equations.numbers, part.found
-    angles = [*numbers, *(one for one in range(len(found.noise[0])) if one not in numbers)]
+    numbers, found, angles = part.equations.numbers, part.found, _angles_of(part)
     words = []
     for one in found.defects:
         cure = held(one.amount, "all") if one.name == "held" else spoilt(one.name, one.amount, alone=False)
@@ -155,22 +154,26 @@ def _lacking_terms(part: Part, merging: Merging) -> list[str]:
     terms = dict.fromkeys([*merging.terms, *(name for _, against, name, _ in suspected if against is None)])
     kinds = merging.kinds_of_terms
     of_masses = [(term, kinds[term]) if term in kinds else term for term in terms]
-    numbers = part.equations.numbers
-    channels = [*numbers, *(one for one in range(len(part.found.noise[0])) if one not in numbers)]
-    links = [_link(channels, mass, against, merging.masses) for mass, against, _, _ in suspected]
+    links = [_link(_angles_of(part), mass, against, merging.masses) for mass, against, _, _ in suspected]
     of_joints = [(name, link) for (_, _, name, _), link in zip(suspected, links, strict=True) if link is not None]
     given = [] if merging.recorded is None else list(getattr(merging.recorded.structure, "terms", ()))
     for (mass, _, name, found), link in zip(suspected, links, strict=True):
         amount = f"{found.value:.3g} ± {found.stderr:.1g} {merging.units[name]}"
         says = BUILT_IN[name].suspected(found.value, amount)
         if link is None:
-            whose = f"of mass {numbers[mass]}: " if merging.masses else ""
+            whose = f"of mass {part.equations.numbers[mass]}: " if merging.masses else ""
             words.append(f"{whose}{says}: give terms={of_masses}")
         else:
             words.append(
                 f"between {_ends(link)}: {says}: give structure=tvident.Chain(…, terms={[*given, *of_joints]})"
             )
     return words
+
+
+def _angles_of(part: Part) -> list[int]:
+    """Return whose angles a part counts: those of its equations first, then all others."""
+    numbers = part.equations.numbers
+    return [*numbers, *(one for one in range(len(part.found.noise[0])) if one not in numbers)]
 
 
 def _link(channels: Sequence[int], mass: int, against: int | None, masses: int) -> tuple[int | str, int] | None:

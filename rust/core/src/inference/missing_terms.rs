@@ -145,12 +145,15 @@ impl JudgedTerm<'_> {
         Ok(self.factors_and_changes(regressors, stages)?.map(|(factors, _)| factors))
     }
 
-    /// The problem with regressors as further constants, which are the last, and its fit, or `None` if these are not determined.
+    /// The problem with regressors as further constants, which are the last, and its fit, or `None` if there are none or they are not determined.
     pub(crate) fn beside(
         &self,
         regressors: &[usize],
         stages: &mut Stages<'_, '_>,
     ) -> Result<Option<(Problem<'_>, Fit)>, Error> {
+        if regressors.is_empty() {
+            return Ok(None);
+        }
         let mut model = self.model.clone();
         model.constant.extend(regressors);
         let problem = model.problem(self.rows, self.rhs, self.noise, Some(self.correlated));

@@ -83,8 +83,7 @@ impl MergedSession<'_, '_, '_> {
         let told: Vec<(usize, (usize, Suspect))> = each.into_iter().zip(found).filter(is_told).collect();
         let conspicuous = told.iter().filter(|(_, (_, suspect))| suspect.is_conspicuous());
         let conspicuous: Vec<usize> = conspicuous.map(|(column, _)| *column).collect();
-        let beside = if conspicuous.is_empty() { None } else { judged.beside(&conspicuous, &mut self.stages)? };
-        let beside = beside.map(|(_, fit)| fit);
+        let beside = judged.beside(&conspicuous, &mut self.stages)?.map(|(_, fit)| fit);
         self.all.rows.regressors.truncate(first);
         Ok(SuspectedChannels { each: told.into_iter().map(|(_, one)| one).collect(), beside })
     }

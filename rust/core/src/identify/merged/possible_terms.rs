@@ -78,7 +78,8 @@ impl MergedSession<'_, '_, '_> {
                 add(&mut columns[*place], *sign, own);
             }
         }
-        for (place, (motion, missing, _)) in possible.iter().enumerate() {
+        let is_kept = |place: usize| {
+            let (motion, missing, _) = &possible[place];
             // Against a base that hardly moves a mass moves as it does on its own: a structure says which of them is held.
             let is_against = possible.iter().zip(&columns).any(|((other, same, _), column)| {
                 other.mass == motion.mass
@@ -86,11 +87,12 @@ impl MergedSession<'_, '_, '_> {
                     && other.against.is_some()
                     && are_alike(column, &columns[place])
             });
-            if (motion.against.is_some() || !is_against) && !self.is_given(motion.mass, &columns[place]) {
-                let column = self.all.rows.regressors.len();
-                candidates.push(PossibleTerm { motion: *motion, missing: *missing, column });
-                self.all.rows.regressors.push(columns[place].clone());
-            }
+            (motion.against.is_some() || !is_against) && !self.is_given(motion.mass, &columns[place])
+        };
+        let kept: Vec<bool> = (0..possible.len()).map(is_kept).collect();
+        for (((motion, missing, _), regressor), _) in possible.into_iter().zip(columns).zip(kept).filter(|one| one.1) {
+            candidates.push(PossibleTerm { motion, missing, column: self.all.rows.regressors.len() });
+            self.all.rows.regressors.push(regressor);
         }
         Ok(candidates)
     }

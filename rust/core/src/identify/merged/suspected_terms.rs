@@ -46,18 +46,12 @@ impl MergedSession<'_, '_, '_> {
     ) -> Result<SuspectedTerms, Error> {
         let first = self.all.rows.regressors.len();
         let mut candidates = self.candidates()?;
-        if candidates.is_empty() {
-            return Ok(SuspectedTerms::default());
-        }
         let rows = &self.all.rows;
         let judged = noise.judged(rows, fitted, correlated, self.options.instructions);
         let mut factors = judged.factors(&columns(&candidates), &mut self.stages)?.unwrap_or_default();
         while let Some(stand) = standing(&factors) {
             let mut stands = stand.into_iter();
             candidates.retain(|_| stands.next().unwrap_or(false));
-            if candidates.is_empty() {
-                return Ok(self.none_beyond(first));
-            }
             factors = judged.factors(&columns(&candidates), &mut self.stages)?.unwrap_or_default();
         }
         let told: Vec<(&PossibleTerm, Suspect)> = candidates
@@ -69,9 +63,8 @@ impl MergedSession<'_, '_, '_> {
             })
             .collect();
         let columns: Vec<usize> = told.iter().map(|(one, _)| one.column).collect();
-        let beside = if columns.is_empty() { None } else { judged.beside(&columns, &mut self.stages)? };
         let mut found = SuspectedTerms::default();
-        if let Some((problem, fit)) = beside {
+        if let Some((problem, fit)) = judged.beside(&columns, &mut self.stages)? {
             let without = fitted.model.problem(rows, &rows.rhs, 1.0, Some(correlated));
             let left = sum_of_squares(&residuals(&problem, &fit, &mut self.stages)?);
             // What is left and may be no noise looks like a little of anything.
@@ -84,12 +77,6 @@ impl MergedSession<'_, '_, '_> {
         }
         self.all.rows.regressors.truncate(first);
         Ok(found)
-    }
-
-    /// No terms, and the columns of candidates gone.
-    fn none_beyond(&mut self, first: usize) -> SuspectedTerms {
-        self.all.rows.regressors.truncate(first);
-        SuspectedTerms::default()
     }
 
     /// The mean square of a term with a factor over that of the torque, in the rows of its equations.

@@ -148,8 +148,7 @@ impl MergedSession<'_, '_, '_> {
         let noise = NoiseOfRows::of_channels(fitted);
         let judged = noise.judged(rows, fitted, &fitted.correlated, self.options.instructions);
         let mut explained = 0.0;
-        let beside = if columns.is_empty() { None } else { judged.beside(&columns, &mut self.stages)? };
-        if let Some((problem, fit)) = beside {
+        if let Some((problem, fit)) = judged.beside(&columns, &mut self.stages)? {
             let count = before.1.iter().filter(|usable| **usable).count().max(1) as f64;
             let fallen = sum_of_squares(before) - sum_of_squares(&residuals(&problem, &fit, &mut self.stages)?);
             explained = fallen / count / fitted.expected.variance;
