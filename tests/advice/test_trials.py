@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -27,16 +27,31 @@ class LeavingSomething(Trial):
     def _feeds_energy(self, *_: object) -> bool:
         return False
 
+    def _worth_it(self, *_: object) -> dict[Any, Any]:
+        return {}
+
 
 def tried(
-    suspects: list[str], *, there: set[str], beyond_chance: list[str], undoubted: Collection[str] = ()
+    suspects: list[str],
+    *,
+    there: set[str],
+    beyond_chance: list[str],
+    undoubted: Collection[str] = (),
+    left: Mapping[str, float] | None = None,
 ) -> list[list[str]]:
-    """Return what is tried beside constants, and what beside parameters that change; some terms are there beside constants."""
+    """Return what is tried beside constants, and what beside parameters that change.
+
+    Some terms are there beside constants. A first look sees what is left with each, or is not possible.
+    """
     stages: dict[str, list[str]] = {"constant": [], "auto": []}
 
-    def identify(*, lag: Any, terms: list[str], diagnose: bool, **given: Any) -> Any:
-        assert diagnose
-        change = "lag" if lag == "auto" else terms[-1]
+    def identify(*, lag: Any, terms: list[Any], diagnose: bool = False, **given: Any) -> Any:
+        names = [one if isinstance(one, str) else one[0] for one in terms[1:]] + ["lag"] * (lag == "auto")
+        if not diagnose:
+            shares = [1.0 if left is None else left.get(one, 1.0) for one in names]
+            spread = np.full(3, np.nan if left is None else np.sqrt(np.prod(shares)))
+            return SimpleNamespace(residual_std=spread, value=lambda _: (1.0, 0.1))
+        change = "+".join(names)
         stages[given["damping"]].append(change)
         is_there = change in there and given["damping"] == "constant"
         return SimpleNamespace(
@@ -46,7 +61,8 @@ def tried(
         )
 
     kinds = {"inertia": "constant", "damping": "varying", "stiffness": "windowed"}
-    result: Any = SimpleNamespace(settings={"kinds": kinds, "lag": 0.0})
+    settings = {"kinds": kinds, "lag": 0.0, "window_length": 21, "exponent": 9}
+    result: Any = SimpleNamespace(settings=settings, time=np.arange(4000.0))
     trial = LeavingSomething(identify, result, AUTOMATIC, ["offset"], suspects, beyond_chance=beyond_chance)
     first, again = (list(trial._each_beside_changes()) for _ in range(2))  # noqa: SLF001 - what is tried is the test
     assert first == again
@@ -55,16 +71,28 @@ def tried(
 
 def test_all_are_tried_beside_constants_and_few_beside_what_changes() -> None:
     suspects = ["cubic", "lag", "coulomb", "preload"]
-    assert tried(suspects, there=set(), beyond_chance=["cubic"]) == [suspects, ["cubic", "lag"]]
+    assert tried(suspects, there=set(), beyond_chance=["cubic"]) == [suspects, ["lag", "cubic"]]
     assert tried(suspects, there={"coulomb"}, beyond_chance=[]) == [suspects, ["lag", "coulomb"]]
     assert tried(suspects, there={"lag", "preload"}, beyond_chance=["preload"]) == [suspects, ["lag", "preload"]]
+
+
+def test_a_first_look_tells_what_is_tried_and_together_with_what() -> None:
+    """What no look sees is tried where something else suspects it; a lag that is not seen is not tried."""
+    suspects = ["cubic", "lag", "coulomb", "preload"]
+    assert tried(suspects, there=set(), beyond_chance=["cubic"], left={"coulomb": 0.2}) == [
+        ["coulomb", "cubic"],
+        ["cubic"],
+    ]
+    both = {"coulomb": 0.2, "lag": 0.8}
+    assert tried(suspects, there=set(), beyond_chance=[], left=both) == [["coulomb", "coulomb+lag", "lag"], ["lag"]]
+    assert tried(suspects, there=set(), beyond_chance=[], left={"coulomb": 0.95}) == [[], []]
 
 
 def test_nothing_is_tried_beside_what_changes_where_nothing_contradicts_an_equation_beside_constants() -> None:
     both = ["coulomb", "lag"]
     assert tried(both, there={"coulomb"}, beyond_chance=["coulomb"], undoubted={"coulomb"}) == [both, []]
     # One that is not there, or that something contradicts, settles nothing.
-    assert tried(both, there={"lag"}, beyond_chance=["coulomb"], undoubted={"coulomb"}) == [both, both]
+    assert tried(both, there={"lag"}, beyond_chance=["coulomb"], undoubted={"coulomb"}) == [both, ["lag", "coulomb"]]
 
 
 def test_friction_that_drives_the_motion_is_none() -> None:

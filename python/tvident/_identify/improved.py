@@ -233,7 +233,7 @@ class Improvement(_AskedOfRecord):
             remedy = remedy if exchanged is None else None
         advice, suspects = exchanged if remedy is None else remedy.words, self._suspects
         if advice is None and (undoubted := trial.undoubted(self._undoubted)):
-            suspects, advice = [undoubted[0]], undoubted[1]
+            suspects, advice = list(undoubted[0]), undoubted[1]
         if advice is None:
             # Beside other advice this comes later.
             words = self._without_worse_offset(result, words)
@@ -274,10 +274,20 @@ class Improvement(_AskedOfRecord):
             if found is not None:
                 is_as_asked = self.request.lag != "auto"
                 return Trial(
-                    identify, found, given, self.asked_terms, self._suspects, is_as_asked, beyond_chance, there
+                    identify,
+                    found,
+                    given,
+                    self.asked_terms,
+                    self._suspects,
+                    is_as_asked,
+                    beyond_chance,
+                    there,
+                    self._others,
                 )
-        again = partial(self._identify, data)
-        return Trial(again, result, self.given, self.asked_terms, self._suspects, self._is_as_asked, beyond_chance)
+        again, is_as_asked = partial(self._identify, data), self._is_as_asked
+        return Trial(
+            again, result, self.given, self.asked_terms, self._suspects, is_as_asked, beyond_chance, others=self._others
+        )
 
     @cached_property
     def _busiest_part(self) -> slice | None:
@@ -363,6 +373,13 @@ class Improvement(_AskedOfRecord):
             others += [name for name, term in BUILT_IN.items() if not getattr(term, "inner", ())]
         present = {*suspects, *(one.name for one in self.terms)}
         return suspects + [name for name in dict.fromkeys(others) if name not in present]
+
+    @property
+    def _others(self) -> list[str]:
+        """Terms that nothing suspects and that a first look may find."""
+        present = {*self._suspects, *(one.name for one in self.terms)}
+        may_be = (name for name, term in BUILT_IN.items() if term.is_sought and not term.inner and name not in present)
+        return [name for name in may_be if self.data.axis.system is ROTARY or not BUILT_IN[name].angle_period]
 
     def _identify(self, data: Data, *, lag: Any, terms: Any, diagnose: bool = False, **given: Any) -> Identification:
         form = WeakForm(**{name: given.pop(name) for name in _LENGTHS if name in given})

@@ -1,0 +1,175 @@
+"""A record that is identified again with another equation, and what that leaves unexplained."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from tvident._arguments import with_error
+from tvident._equation import BUILT_IN, COEFFICIENTS
+from tvident._identify.left_over import Left, Unexplained, unexplained
+from tvident._identify.offered import NEARLY_ALL, SUSPECTED, feeds_energy, is_there, moved
+from tvident._results import Identification
+from tvident._status import Status
+
+WORTH = 0.9
+"""A change is worth it if the residuals' variance falls to this part or below."""
+
+BETTER = 0.8
+"""What is advised leaves at most this part of what the model at hand leaves unexplained of parts that are held back."""
+
+_BETTER_BY_FAR = 0.5
+"""The same where nothing contradicts the model at hand: then only a simpler one needs no more than that."""
+
+LEFT_OVER = Status.RANK_DEFICIENT | Status.ILL_CONDITIONED | Status.NOISE_MODEL | SUSPECTED | Status.CHANNEL_SUSPECTED
+"""Flags of a record whose equations leave something over, or tell nothing apart."""
+
+CONTRADICTED = LEFT_OVER | Status.SCALES_DISAGREE | Status.KIND_CONTRADICTED
+"""Flags of a record whose model something contradicts."""
+
+Call = dict[str, Any]
+
+Names = tuple[str, ...]
+"""Terms, and ``"lag"``, that are tried together."""
+
+
+@dataclass(frozen=True)
+class TriedRecord:
+    """A record that can be identified again with other terms, and what it was suspected of.
+
+    Parameters
+    ----------
+    identify : callable
+        Takes arguments of ``identify`` and returns a result.
+    result : Identification
+        What was found so far.
+    given : mapping of str to object
+        Inertia, damping and stiffness as they were asked for.
+    terms : sequence
+        Terms that were asked for, without kinds.
+    suspects : sequence of str
+        Terms that may be missing, and ``"lag"``.
+    is_as_asked : bool
+        Whether the result is what ``identify`` gives for what was asked for.
+    beyond_chance : sequence of str
+        Those of them that explain a part of what the result leaves, beside all that it found to change.
+    at_hand : Identification, optional
+        What was found of these samples where they are a part of a record, which is what advice is about.
+    others : sequence of str
+        Terms that nothing suspects and that a first look may find.
+    """
+
+    identify: Callable[..., Identification]
+    result: Identification
+    given: Mapping[str, Any]
+    terms: Sequence[Any]
+    suspects: Sequence[str]
+    is_as_asked: bool = False
+    beyond_chance: Sequence[str] = ()
+    at_hand: Identification | None = None
+    others: Sequence[str] = ()
+    _now: dict[int | None, Unexplained] = field(default_factory=dict, init=False, repr=False)
+    _beside: dict[int, dict[Names, Identification]] = field(default_factory=dict, init=False, repr=False)
+    _looks: dict[Names, float] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def _worth(self) -> float:
+        """What a model that is no simpler leaves at most of what the one at hand does not explain, to be advised."""
+        return BETTER if self.result.record_status & CONTRADICTED else _BETTER_BY_FAR
+
+    @property
+    def _of_constants_alone(self) -> Call:
+        """The call that finds everything constant."""
+        constant = {name: "constant" if isinstance(kind, str) else kind for name, kind in self.given.items()}
+        return constant | {"terms": list(self.terms), "lag": self.result.settings["lag"]}
+
+    def _tried(self, kinds: Mapping[str, Any], call: Call) -> Identification | None:
+        """Return what is found with other terms or another lag; None where that cannot be asked of the record."""
+        try:
+            return self.identify(**kinds, terms=call["terms"], lag=call["lag"], diagnose=True)
+        except ValueError:
+            return None
+
+    def _leaves_nothing(self, found: Identification, most: float = NEARLY_ALL) -> bool:
+        """Return whether nothing that an equation mends contradicts a result, and it leaves at most so much of what was left."""
+        contradicted = found.record_status & CONTRADICTED & ~Status.CHANNEL_SUSPECTED
+        return not contradicted and self._left_of(found).ratio <= most
+
+    def _may_be(self, names: Names, found: Identification) -> bool:
+        """Return whether suspects are beyond chance, can be what they are called, and leave a machine that can be."""
+        return all(is_there(one, found) for one in names) and not self._feeds_energy(found)
+
+    def _feeds_energy(self, found: Identification) -> bool:
+        """Return whether a machine has a negative inertia or damping with another equation only."""
+        return feeds_energy(found) and not feeds_energy(self.result)
+
+    def _left_of(self, found: Identification) -> Left:
+        """Return what a result leaves unexplained, as far ahead as the longer of both test functions.
+
+        One test function ahead is another distance for each, and what is near is predicted by anything.
+        """
+        lengths = [one.settings["window_length"] for one in (found, self.result)]
+        ahead = max((length for length in lengths if isinstance(length, int)), default=None)
+        if ahead not in self._now:
+            self._now[ahead] = unexplained(self.result, ahead)
+        now = self._now[ahead]
+        return Left(now if found is self.result else unexplained(found, ahead), now)
+
+    def _with(self, call: Call, *changes: str) -> Call:
+        terms = [one for one in changes if one != "lag"]
+        return call | {"terms": [*call["terms"], *terms]} | ({"lag": "auto"} if "lag" in changes else {})
+
+    @property
+    def _explains_nothing(self) -> bool:
+        is_lost = bool(self.result.record_status & Status.RANK_DEFICIENT)
+        return is_lost and not any(np.isfinite(getattr(self.result, name)).any() for name in COEFFICIENTS)
+
+    def _identified(self, call: Call, *, diagnose: bool = False) -> Identification:
+        return self.identify(
+            **(call | {"terms": [(term, "constant") for term in call["terms"]]}), **self._function, diagnose=diagnose
+        )
+
+    @cached_property
+    def _function(self) -> dict[str, Any]:
+        """Return the test function of trials: the one at hand, or, where that hears mostly noise, the widest that agrees."""
+        settings = self.result.settings
+        function = {name: settings[name] for name in ("window_length", "exponent")}
+        scans = self.result._found.scans  # noqa: SLF001 - what was compared while it was identified
+        if self.result.record_status & Status.ILL_CONDITIONED and scans and scans[0].plateau is not None:
+            function["window_length"] = max(function["window_length"], scans[0].plateau[1])
+        return function
+
+    def _spread(self, call: Call) -> float:
+        """Return the variance of the residuals where everything is constant."""
+        try:
+            found = self._identified(call)
+        except ValueError:
+            return np.inf
+        if not all(is_there(one, found) for one in self.suspects if one in found.terms):
+            return np.inf
+        spread = found.residual_std[np.isfinite(found.residual_std)]
+        return float(np.median(spread)) ** 2 if spread.size else np.inf
+
+    def _moved(self, found: Identification, *, is_more: bool = True) -> str:
+        """Return which parameters a better equation finds elsewhere, in words; one with more in it may find that they never varied."""
+        unknown = [name for name in COEFFICIENTS if isinstance(self.given[name], str)]
+        return moved(found, self.result, self.at_hand, unknown, is_more=is_more)
+
+    def _change(self, names: Names, found: Identification) -> str:
+        """Return how suspects are given."""
+        terms = [one for one in names if one != "lag"]
+        shown = [term if isinstance(term, str) else term.name for term in (*self.terms, *terms)]
+        changes = [f"terms={shown}"] if terms else []
+        return ", ".join(changes + ([f"lag={found.settings['lag']:.4g}"] if "lag" in names else []))
+
+    def _suspicion(self, name: str, found: Identification) -> str:
+        if name == "lag":
+            late, rate = found.settings["lag"], found.settings["sample_rate"]
+            error = found.settings.get("lag_stderr") or 0.0
+            return f"the torque is {'late' if late > 0 else 'early'} by {with_error(abs(late) * rate, error * rate)} samples"
+        value, error, *_ = found.value(name)
+        return BUILT_IN[name].suspected(value, f"{with_error(value, error)} {found.units.get(name, '')}")
