@@ -40,8 +40,11 @@ _MOST = 1 << 14
 _PART, _FUNCTIONS = 1 << 14, 64
 """Samples, and test functions, that tell what is missing."""
 
-_LONG = 1 << 16
+_LONG = 1 << 15
 """Samples from which on a record is tried on a part of it."""
+
+_SHORT = 1 << 16
+"""Samples up to which an offset that is free in every window is tried on the whole record."""
 
 _READ = 1 << 11
 """Samples of a part that tell how busy it is."""
@@ -256,7 +259,7 @@ class Improvement(_AskedOfRecord):
     def _without_worse_offset(self, result: Identification, words: Words) -> Words:
         terms = [*(term for term in self.asked_terms if term != OFFSET), (OFFSET, "windowed")]
         with_offset = partial(self._identify, self.data, **self.given, terms=terms, lag=self.request.lag)
-        return without_worse_offset(words, result, with_offset) if self.data.time.size < _LONG else words
+        return without_worse_offset(words, result, with_offset) if self.data.time.size < _SHORT else words
 
     def _trial(self, result: Identification) -> Trial:
         """Return the trial of the record, or of its busiest part where that tells as much."""
