@@ -174,6 +174,7 @@ impl LocalPolynomials {
         }
         let triangle = Triangle::new(basis, options, record.samples, first, &held);
         let Some(order) = triangle.order(options) else { return IncompleteEstimate::invalid(wanted, flags) };
+        let is_full = flags == Status::GOOD;
         let is_chosen = matches!(options.order, Order::Chosen { .. });
         if is_chosen && self.orders() > 1 {
             if order == 0 {
@@ -195,7 +196,7 @@ impl LocalPolynomials {
             let scale = options.delta.powi(-i32::try_from(*derivative).unwrap_or(i32::MAX));
             let functional = triangle.functional(&basis.evaluate(position, *derivative));
             // A full window around its sample has the order that fits it, as everywhere.
-            let lowest = if is_chosen && flags != Status::GOOD { (*derivative).min(order) } else { order };
+            let lowest = if is_chosen && !is_full { (*derivative).min(order) } else { order };
             let (value, own) = triangle.best(&functional, lowest..order, order, variance);
             let error = if shares.is_empty() { own } else { triangle.error(&functional, value, &shares) };
             let level = if *derivative == 0 { triangle.reference } else { 0.0 };
