@@ -37,6 +37,11 @@ def left() -> list[str]:
         ({"torque": "nope"}, KeyError, "has no channel 'nope'"),
         ({"torque_unit": "deg"}, ValueError, "the torque must be in a unit that can be converted to N m"),
         ({"stiffness": "x"}, ValueError, "must be"),
+        ({"angle_unit": b"deg"}, TypeError, "angle_unit must be text; got bytes; write 'deg'"),
+        ({"torque_unit": 1 + 2j}, TypeError, "torque_unit must be text; got complex; "),
+        ({"terms": [()]}, ValueError, r"a term must be 'offset', 'coulomb', .*; got \(\); use one of these"),
+        ({"terms": [("offset",)]}, ValueError, r"a term must be 'offset', .*; got \('offset',\); "),
+        ({"terms": [("offset", "constant", 1)]}, ValueError, r"a term must be 'offset', .*; got \('offset', "),
     ],
 )
 def test_a_wrong_call_leaves_nothing(changed: dict[str, Any], error: type[Exception], message: str) -> None:

@@ -153,6 +153,7 @@ def identify_file(
     threads = arguments.worker_count(workers)
     arguments.one_of("nan_policy", nan_policy, ("omit", "propagate", "raise"))
     _check_named({"angle": angle, "torque": torque}, {"t": t, "weights": weights}, settings)
+    _check_units(angle_unit=angle_unit, torque_unit=torque_unit)
     delta, sample_rate = (
         None if one is None else arguments.positive_number(name, one)
         for name, one in (("delta", delta), ("sample_rate", sample_rate))
@@ -216,6 +217,13 @@ def _check_named(names: Mapping[str, object], others: Mapping[str, object], sett
         raise TypeError(
             f"settings must be those of an earlier result; got {arguments.shown(settings)}; pass result.settings"
         )
+
+
+def _check_units(**units: object) -> None:
+    """Check that units are words, before they become part of what is kept."""
+    for name, unit in units.items():
+        if unit is not None and not isinstance(unit, str):
+            raise TypeError(f"{name} must be text; got {type(unit).__name__}; write 'deg', 'N m' or 'ms', say")
 
 
 _WRONG = (FileError, ValueError, TypeError, KeyError)

@@ -49,7 +49,8 @@ class AskedOfFile:
         request = requested(given.method, given.equation, given.settings, rate)
         self.long: Long | None = None
         changing = {"windowed", "varying"}
-        kinds = [*request.parameters.values(), *(term[1] for term in request.terms if isinstance(term, tuple | list))]
+        pairs = (term for term in request.terms if isinstance(term, tuple | list))
+        kinds = [*request.parameters.values(), *(kind for pair in pairs for kind in pair[1:])]
         self.is_narrow = isinstance(request.form, WeakForm) and sum(str(kind) in changing for kind in kinds) <= 1
         if isinstance(request.form, WeakForm):
             return
