@@ -14,6 +14,7 @@ from tvident import _core
 from tvident._clocks.grid import Grid, neighbours, weights_on_grid
 from tvident._clocks.missing import LEAST_BRIDGED, bridge_of
 from tvident._clocks.order import chosen_order, longest_bridged
+from tvident._clocks.packets import evened_packets
 from tvident._clocks.passed import Passed
 
 Numbers = npt.NDArray[np.float64]
@@ -194,6 +195,13 @@ def _told(
     workers: int | None,
 ) -> Clock:
     """Return what times are like, and what is done with them by splines of an order."""
+    packets = evened_packets(grid, channels)
+    if packets is not None:
+        grid, name = packets
+        return _even(
+            grid,
+            f"stamps come in packets, but the {name} goes on within and between them as in sample number, not in time",
+        )
     if grid.jitter == 0:
         return Clock(grid, "lost", order, _lost(grid, order))
     share = f"steps of time scatter by {grid.jitter:.2g} of a step"
@@ -220,14 +228,19 @@ def _told(
             "of different clocks; do not trust the numbers before each has its own times",
         )
     name, ratio = max(in_number.items(), key=lambda one: one[1])
+    noise = f"where its noise is {math.sqrt(ratio):.2g} times as large"
+    return _even(grid, f"{share}, but the {name} is smooth in sample number and not in time, {noise}")
+
+
+def _even(grid: Grid, why: str) -> Clock:
+    """Return the clock of samples that were taken evenly, whatever their stamps say."""
     rate = 1 / grid.even_period
     return Clock(
         grid,
         "even",
         0,
         f"samples were taken to be even at {rate:.9g} Hz{_gaps(replace(grid, bridged=grid.longest))}",
-        f"{share}, but the {name} is smooth in sample number and not in time, where its noise is {math.sqrt(ratio):.2g} times as large: "
-        "the stamps jitter, not the samples, as behind a buffer; samples were taken to be even; give "
+        f"{why}: the stamps jitter, not the samples, as behind a buffer; samples were taken to be even; give "
         f"sample_rate={rate:.9g} to say so",
     )
 

@@ -52,6 +52,8 @@ class Grid:
         The longest step in periods that splines go over: as long, or shorter where they do not predict what lies in it.
     jitter : float
         By how much steps scatter, as the share of a period within which times that scatter so lie; 0 where samples lie on the grid.
+    packets : ndarray, optional
+        The sample after every pause between packets, where stamps come in packets and samples do not.
     """
 
     start: float
@@ -61,6 +63,7 @@ class Grid:
     longest: float
     bridged: float
     jitter: float
+    packets: npt.NDArray[np.intp] | None = None
 
     @property
     def time(self) -> Numbers:
@@ -69,9 +72,14 @@ class Grid:
 
     @property
     def even_period(self) -> float:
-        """The period of samples that were taken evenly, by least squares of all stamps."""
-        numbers = self.numbers.astype(np.float64)
-        return self.period * float(np.polynomial.Polynomial.fit(numbers, self.places, 1).deriv()(0.0))
+        """The period of samples that were taken evenly, by least squares of all stamps, or of the centres of whole packets."""
+        numbers, places = self.numbers.astype(np.float64), self.places
+        if self.packets is not None:
+            # A line through steps would be less steep than what they follow.
+            whole = slice(self.packets[0], self.packets[-1])
+            firsts = self.packets[:-1] - self.packets[0]
+            numbers, places = (np.add.reduceat(one[whole], firsts) / np.diff(self.packets) for one in (numbers, places))
+        return self.period * float(np.polynomial.Polynomial.fit(numbers, places, 1).deriv()(0.0))
 
     @property
     def numbers(self) -> npt.NDArray[np.int64]:
@@ -141,7 +149,8 @@ def grid_of(times: Numbers) -> Grid:
     usual = float(np.median(steps))
     longest = max(_GAP * usual, _RARE * float(np.quantile(steps, _SHARE, method="lower")))
     lost = _with_lost_samples(times, steps, usual)
-    if lost is not None:
+    # Packets whose stamps are few counts of a clock apart within them are no clock that lost nearly all samples.
+    if lost is not None and (lost[1][-1] < _MOST_GRID * times.size or float(steps.max()) > longest):
         period, places = lost
         jitter = 0.0
     else:
@@ -154,7 +163,8 @@ def grid_of(times: Numbers) -> Grid:
         place = int(steps.argmax()) + 1
         raise ValueError(
             f"t must have no gaps that take nine tenths of the time; steps are {usual:g} s mostly, but the one to t[{place}] is "
-            f"{steps[place - 1]:g} s; identify the parts before and after it on their own{arguments.clock_changed(float(steps[place - 1]))}"
+            f"{steps[place - 1]:g} s; identify the parts before and after it on their own, or give sample_rate= where a buffer "
+            f"stamps even samples{arguments.clock_changed(float(steps[place - 1]))}"
         )
     return Grid(float(times[0]), period, samples, places, longest / period, longest / period, jitter)
 
