@@ -30,6 +30,9 @@ _PARTS, _SHORTEST = 6, 1500
 _SHORTEST_SEARCH = 64
 """Samples without which nothing is looked for: no equation holds for so few."""
 
+_VARIES, _ROWS = 12, 100
+"""Cosines over the record by which the stiffness may vary at any alignment, at most, and equations for each, at least."""
+
 _ROUNDS = 3
 """Rounds of aligning with what was found."""
 
@@ -139,7 +142,8 @@ def _line(
 def _coarse(angle: npt.NDArray[np.number], torque: npt.NDArray[np.number]) -> tuple[int, float]:
     """Return by how many samples the torque is late, about, and what that leaves unexplained over the middle of all other alignments.
 
-    The equation of motion in weak form, all constant, by least squares at every alignment: correlations with orthonormal columns.
+    The equation of motion in weak form by least squares at every alignment: correlations with orthonormal columns. All is constant but the
+    stiffness: where that varies by much and all were constant, a wrong alignment could leave less than the right one.
     """
     there = np.flatnonzero(np.isfinite(angle) & np.isfinite(torque))
     samples = 0 if there.size == 0 else int(there[-1] - there[0]) + 1
@@ -155,7 +159,10 @@ def _coarse(angle: npt.NDArray[np.number], torque: npt.NDArray[np.number]) -> tu
     columns = [_convolved(angle, kernel) for kernel in kernels]
     filtered = _convolved(torque, kernels[0])
     rows = slice(farthest, columns[0].size - farthest)
-    design = np.stack([*(column[rows] for column in columns), np.ones(columns[0][rows].size)], axis=1)
+    count = columns[0][rows].size
+    turns = np.linspace(0.0, np.pi, count)
+    varying = [columns[0][rows] * np.cos(number * turns) for number in range(1, min(_VARIES, count // _ROWS) + 1)]
+    design = np.stack([*(column[rows] for column in columns), np.ones(count), *varying], axis=1)
     basis, _ = np.linalg.qr(design / np.linalg.norm(design, axis=0))
     size = 1 << (filtered.size + design.shape[0]).bit_length()
     spectrum = np.fft.rfft(filtered, size)
