@@ -1,15 +1,22 @@
-"""Clocks that are aligned wherever the stiffness varies."""
+"""Clocks that are aligned: wherever the stiffness varies, and drifts that nobody asked for."""
 
 from __future__ import annotations
 
+import re
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
+import pytest
 
+import tvident
+from tvident import Status
 from tvident._identify.aligned import _coarse
 
 Array = npt.NDArray[np.float64]
 
 RATE = 1000.0
+CONSTANT: dict[str, Any] = {"inertia": "constant", "damping": "constant", "stiffness": "constant"}
 
 
 class Moved:
@@ -53,3 +60,28 @@ def test_a_stiffness_that_varies_aligns_nothing_wrongly() -> None:
         away.append(abs(found - 30))
     # With constants alone several of 40 were hundreds of samples away.
     assert max(away) < 25
+
+
+@pytest.mark.parametrize("drift", [1e-4, -3e-5])
+def test_a_drift_that_nobody_asked_for_is_said(drift: float) -> None:
+    moved = Moved(1, 0.0)
+    t = np.arange(10_000) / RATE
+    angle, torque = moved.angle(t, 1e-3), moved.torque(t, 0.01)
+    found = tvident.identify(angle, torque, t=(t, t + 0.02 + drift * t), align="offset", **CONSTANT)
+    (words,) = (one for one in found.advice if "run at different speeds" in one)
+    said_of = re.search(r"become (\S+) ± (\S+) s", words)
+    assert said_of is not None
+    assert abs(float(said_of[1]) - abs(drift)) < 4 * float(said_of[2])
+    assert ("later" if drift > 0 else "earlier") in words
+    assert "align='drift'" in words
+    assert found.record_status & Status.CHANNEL_SUSPECTED
+    said = tvident.identify(angle, torque, t=(t, t + 0.02 + drift * t), align="drift", **CONSTANT)
+    assert not any("run at different speeds" in one for one in said.advice)
+
+
+@pytest.mark.parametrize("seed", [2, 3, 4])
+def test_clocks_of_one_speed_are_not_said_to_drift(seed: int) -> None:
+    moved = Moved(seed, 0.2 * (seed == 4))
+    t = np.arange(10_000) / RATE
+    found = tvident.identify(moved.angle(t, 1e-3), moved.torque(t, 0.01), t=(t, t + 0.02), align="offset")
+    assert not any("run at different speeds" in one for one in found.advice)

@@ -27,6 +27,9 @@ _MOST_LEFT = 0.7
 _PARTS, _SHORTEST = 6, 1500
 """Parts of a record whose lags tell a drift, and samples of the shortest."""
 
+_SURE = 5.0
+"""Standard errors that a drift which nobody asked for must be away from none."""
+
 _SHORTEST_SEARCH = 64
 """Samples without which nothing is looked for: no equation holds for so few."""
 
@@ -80,17 +83,38 @@ def aligned(data_of: Callable[[Late], Data], lag_of: Callable[[Data], tuple[floa
         doubt = "the record hardly tells how the clocks of angle and torque are aligned: excite several frequencies, or give both times"
     for _ in range(_ROUNDS):
         data = data_of(late)
-        count = 1 if align == "offset" else max(2, min(_PARTS, data.time.size // _SHORTEST))
-        parts = [_part(data, part, count) for part in range(count)]
-        lags = [lag_of(part) for part in parts]
-        middles = [float(part.time.mean()) - start for part in parts]
+        lags, middles = ([lag_of(data)], [0.0]) if align == "offset" else _lags_of_parts(data, lag_of, start)
         left, errors, moves = _line(middles, lags, align)
         if not all(math.isfinite(one) for one in (*left, errors[0])):
-            return Aligned(late, (math.nan, math.nan), doubt or "no lag could be told from the damping")
+            drifts = _drifts(data, lag_of, start) if align == "offset" else ""
+            return Aligned(late, (math.nan, math.nan), doubt or drifts or "no lag could be told from the damping")
         late = (late[0] + left[0], late[1] + left[1])
         if abs(left[0]) <= errors[0] / 2 and abs(left[1]) <= (errors[1] / 2 if align == "drift" else 0.0):
             break
+    if align == "offset" and not doubt:
+        doubt = _drifts(data_of(late), lag_of, start)
     return Aligned(late, errors, doubt, moves)
+
+
+def _drifts(data: Data, lag_of: Callable[[Data], tuple[float, float]], start: float) -> str:
+    """Return what is wrong with one offset for all of a record: its clocks run at different speeds, as lags of its parts say."""
+    lags, middles = _lags_of_parts(data, lag_of, start)
+    (_, drift), (_, error), _ = _line(middles, lags, "drift")
+    if not abs(drift) > _SURE * error:
+        return ""
+    return (
+        f"the clocks of angle and torque seem to run at different speeds: stamps of the torque become {abs(drift):.2g} ± {error:.1g} s "
+        f"{'later' if drift > 0 else 'earlier'} each second; give align='drift'"
+    )
+
+
+def _lags_of_parts(
+    data: Data, lag_of: Callable[[Data], tuple[float, float]], start: float
+) -> tuple[list[tuple[float, float]], list[float]]:
+    """Return the lags of parts of a record with their errors, and the times in the middle of each, from a start on."""
+    count = max(2, min(_PARTS, data.time.size // _SHORTEST))
+    parts = [_part(data, part, count) for part in range(count)]
+    return [lag_of(part) for part in parts], [float(part.time.mean()) - start for part in parts]
 
 
 def _part(data: Data, part: int, parts: int) -> Data:
