@@ -324,3 +324,16 @@ def test_full_windows_have_the_order_that_they_name_whatever_its_flags_are(highe
     assert np.any(alone.status[inner] & Status.HIGHEST_ORDER)
     np.testing.assert_array_equal(weighted.order[inner], alone.order[inner])
     np.testing.assert_allclose(weighted.derivatives[:, inner], alone.derivatives[:, inner], rtol=0, atol=1e-12)
+
+
+def test_beside_gaps_of_chosen_windows_a_step_leaves_out_what_is_not_wanted() -> None:
+    generator = np.random.default_rng(5)
+    y = np.sin(np.arange(3000) / 40) + 1e-3 * generator.standard_normal(3000)
+    y[generator.uniform(size=y.size) < 0.01] = np.nan
+    whole = tvident.fit_local_polynomials(y, "auto", delta=0.001, nan_policy="omit")
+    some = tvident.fit_local_polynomials(y, "auto", delta=0.001, nan_policy="omit", step=7)
+    assert np.isfinite(some.derivatives).all()
+    np.testing.assert_array_equal(some.derivatives, whole.derivatives[:, ::7])
+    np.testing.assert_array_equal(some.stderr, whole.stderr[:, ::7])
+    np.testing.assert_array_equal(some.order, whole.order[::7])
+    np.testing.assert_array_equal(some.status, whole.status[::7])

@@ -49,16 +49,21 @@ def choose_beside_gaps(
     choose_one = partial(choose, max_deriv=max_deriv, step=1, progress=None)
     each = []
     for done, record in enumerate(records):
-        each.append(_of_record(choose_one, plan_of, longest_gap, record, workers))
+        each.append(_of_record(choose_one, plan_of, longest_gap, record, workers, step))
         if progress is not None:
             progress(done + 1, len(records))
     return together(each, samples.shape[:-1], step, by_record=CHOSEN)
 
 
 def _of_record(
-    choose: Callable[[Numbers], Found], plan_of: PlanOf, longest_gap: int | None, record: Numbers, workers: int | None
+    choose: Callable[[Numbers], Found],
+    plan_of: PlanOf,
+    longest_gap: int | None,
+    record: Numbers,
+    workers: int | None,
+    step: int,
 ) -> Found:
-    """Return what is found of one record."""
+    """Return what is found of one record; beside gaps at every so many samples alone."""
     there = np.isfinite(record)
     if there.all() or not there.any():
         return choose(record)
@@ -74,9 +79,8 @@ def _of_record(
     lengths = [sliding_window(length, record.size) for length in np.asarray(found.window_length).tolist()]
     for derivative, (own, order) in enumerate(zip(lengths, found.settings["order"], strict=True)):
         plan = plan_of(own, highest=order, derivative=derivative)
-        beside = filled(
-            plan, plan.estimate(record, workers=workers), record, left_out(own, longest_gap), step=1, workers=workers
-        )
+        without = replace(left_out(own, longest_gap), every=step)
+        beside = filled(plan, plan.estimate(record, workers=workers), record, without, step=1, workers=workers)
         # Windows are averaged with others of up to twice the length.
         near = _near(~there, own)
         found.derivatives[derivative, near] = beside.derivatives[derivative, near]
@@ -92,12 +96,12 @@ def _bridged(record: Numbers, plan: _core.LocalPolynomials, without: Incomplete,
 
     The noise of the record is estimated from it, too.
     """
-    found = filled(plan, plan.estimate(record, workers=workers), record, without, step=1, workers=workers)
     missing = np.flatnonzero(~np.isfinite(record))
+    found = plan.estimate_incomplete(record, missing.tolist(), without.longest_gap, without.least, workers=workers)
     noise = np.random.default_rng(missing.size).standard_normal(missing.size)
     bridged = record.copy()
-    bridged[missing] = found.derivatives[0, missing] + found.sigma[missing] * noise
-    told = found.errors()[0, missing] <= found.sigma[missing]
+    bridged[missing] = found.derivatives[0] + found.sigma * noise
+    told = found.stderr[0] <= found.sigma
     bridged[missing[~told]] = np.nan
     return bridged
 

@@ -35,12 +35,15 @@ class Incomplete:
         Samples; windows do not reach across longer gaps.
     least : int
         Samples that a window must hold.
+    every : int, optional
+        Of the estimates that lack samples every how many are wanted; others stay as they are.
     """
 
     omit: bool
     weights: Array | None
     longest_gap: int
     least: int
+    every: int = 1
 
     def plain(self, samples: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return samples whose windows are not to be fitted if they hold what is no number."""
@@ -152,7 +155,7 @@ def filled(
         weight = None if incomplete.weights is None else incomplete.weights[index]
         lost = status[index] & Status.INVALID != 0
         wanted = lost if weight is None else np.ones_like(lost) if incomplete.omit else ~lost
-        places = np.flatnonzero(wanted)
+        places = np.flatnonzero(wanted[:: incomplete.every]) * incomplete.every
         if not places.size:
             continue
         found = core_plan.estimate_incomplete(
