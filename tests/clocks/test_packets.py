@@ -81,3 +81,34 @@ def test_pauses_that_are_longer_than_others_are_gaps() -> None:
     evened = evened_packets(grid_of(stamps), {"angle": moved(np.arange(COUNT) / RATE, 1e-3)[0]})
     assert evened is not None
     assert evened[0].numbers[-1] > COUNT + 100
+
+
+@pytest.mark.parametrize("size", [4, 16, 50])
+@pytest.mark.parametrize("apart", [1e-5, 2e-4])
+def test_a_channel_behind_a_buffer_is_even_beside_another_clock(size: int, apart: float) -> None:
+    ours, theirs = stamped(size, apart), np.arange(COUNT) / RATE
+    angle, torque = moved(theirs, 1e-3)
+    found = tvident.identify(angle, torque, t=(ours, theirs), align="offset")
+    assert found.record_status & Status.CHANNEL_SUSPECTED
+    assert any("stamps of the angle come in packets" in one for one in found.advice)
+    for name, true in (("inertia", INERTIA), ("damping", DAMPING), ("stiffness", STIFFNESS)):
+        away = np.abs(getattr(found, name) - true) / found.stderr[name]
+        assert np.median(away[found.trusted]) < 4
+    assert np.mean(found.trusted) > 0.9
+    # Stamps are those of the first sample of each packet, which nobody knows: the middle is taken.
+    assert abs(found.constants["clock_offset"][0]) < size / RATE / 2 + 1e-3
+
+
+def test_without_an_alignment_a_buffer_beside_another_clock_says_what_to_do() -> None:
+    ours, theirs = stamped(16, 1e-5), np.arange(COUNT) / RATE
+    angle, torque = moved(theirs, 1e-3)
+    found = tvident.identify(torque=torque, angle=angle, t=(ours, theirs))
+    assert any("stamps of the angle come in packets" in one and "align='offset'" in one for one in found.advice)
+    assert found.record_status & Status.CHANNEL_SUSPECTED
+
+
+def test_packets_of_samples_stay_at_their_times_beside_another_clock() -> None:
+    ours, theirs = stamped(16, 5e-4), np.arange(COUNT) / RATE
+    angle, torque = moved(ours, 1e-3)[0], moved(theirs, 1e-3)[1]
+    found = tvident.identify(angle, torque, t=(ours, theirs))
+    assert not any("come in packets" in one for one in found.advice)

@@ -15,6 +15,7 @@ from tvident import _arguments as arguments
 from tvident import _core
 from tvident._clocks.grid import Grid, Numbers, grid_of
 from tvident._clocks.missing import longest_bridged_in
+from tvident._clocks.packets import evened_packets
 from tvident._clocks.passed import Passed
 from tvident._units import times_in_seconds
 
@@ -40,6 +41,8 @@ class TwoClocks:
         Seconds.
     samples : int
         Of the grid, from the first to the last time that both have.
+    doubt : str
+        What is wrong with stamps; empty where nothing is.
     """
 
     angle: Grid
@@ -47,6 +50,7 @@ class TwoClocks:
     start: float
     period: float
     samples: int
+    doubt: str = ""
 
     @property
     def time(self) -> Numbers:
@@ -137,7 +141,14 @@ def two_clocks(
     ValueError
         If times do not increase, or share no time.
     """
-    own = [_grid(one, samples, time_unit) for one, samples in zip((angle, torque), channels, strict=True)]
+    read = [_grid(one, samples, time_unit) for one, samples in zip((angle, torque), channels, strict=True)]
+    own = [grid for grid, _ in read]
+    late = {name: late for name, (_, late) in zip(("angle", "torque"), read, strict=True) if late > 0}
+    doubt = "; ".join(
+        f"stamps of the {name} come in packets, but its samples go on evenly, as behind a buffer: they were taken to be even, and when the "
+        f"first was taken is known to {late:.2g} s only"
+        for name, late in late.items()
+    )
     start = max(one.start for one in own)
     end = min(one.start + one.period * float(one.places[-1]) for one in own)
     # On the samples of one of the clocks, so that these stay as they are.
@@ -148,11 +159,11 @@ def two_clocks(
             f"the times of angle and torque must overlap; they share {max(0.0, end - start):g} s; check the clocks' units and starts"
         )
     start = leading.start + math.ceil((start - leading.start) / period - _SAME) * period
-    return TwoClocks(own[0], own[1], start, period, math.floor((end - start) / period + _SAME) + 1)
+    return TwoClocks(own[0], own[1], start, period, math.floor((end - start) / period + _SAME) + 1, doubt)
 
 
-def _grid(times: Any, channel: npt.NDArray[np.number], time_unit: str | None) -> Grid:
-    """Return the clock of one channel."""
+def _grid(times: Any, channel: npt.NDArray[np.number], time_unit: str | None) -> tuple[Grid, float]:
+    """Return the clock of one channel, and by how many seconds its stamps may be late where they come in packets and it does not."""
     samples = channel.shape[-1]
     if np.ndim(times) == 0:
         period = arguments.sample_period(samples, sample_rate=times)
@@ -163,6 +174,17 @@ def _grid(times: Any, channel: npt.NDArray[np.number], time_unit: str | None) ->
             period = arguments.sample_period(samples, t=times)
             arguments.check_no_lost_samples(times, channel)
         except arguments.NotUniformError as error:
-            return grid_of(error.times)
+            grid = grid_of(error.times)
+            evened = evened_packets(grid, {"channel": channel})
+            return (grid, 0.0) if evened is None else _even(evened[0])
         start = float(arguments.times_of(times).flat[0])
-    return Grid(start, period, samples, np.arange(samples, dtype=np.float64), _GAP, _GAP, 0.0)
+    return Grid(start, period, samples, np.arange(samples, dtype=np.float64), _GAP, _GAP, 0.0), 0.0
+
+
+def _even(grid: Grid) -> tuple[Grid, float]:
+    """Return the clock of samples that were taken evenly, whose stamps come in packets, and half a packet in seconds."""
+    period, numbers = grid.even_period, grid.numbers.astype(np.float64)
+    start = grid.start + float(np.mean(grid.period * grid.places - period * numbers))
+    packets = 1 if grid.packets is None else grid.packets.size
+    half = numbers.size / (packets + 1) / 2 * period
+    return Grid(start, period, int(numbers[-1]) + 1, numbers, _GAP, _GAP, 0.0), half

@@ -189,7 +189,10 @@ class OwnClocks:
         motion = final.motion
         if self.align is not None:
             motion = replace(motion, biases={**motion.biases, **constants})
-        doubts = [*final.doubts, *([(0, found.doubt)] if found.doubt else [])]
+        of_stamps = self.clocks.doubt
+        if of_stamps and self.align is None:
+            of_stamps += "; give align='offset', or times that are right"
+        doubts = [*final.doubts, *((0, doubt) for doubt in (of_stamps, found.doubt) if doubt)]
 
         def change(move: Late) -> npt.NDArray[np.float64]:
             later = data_of((found.late[0] + move[0], found.late[1] + move[1]))
