@@ -62,6 +62,15 @@ def test_a_stiffness_that_varies_aligns_nothing_wrongly() -> None:
     assert max(away) < 25
 
 
+@pytest.mark.parametrize("seed", [45, 63, 69])
+def test_a_stiffness_that_may_vary_does_not_follow_a_drift(seed: int) -> None:
+    moved = Moved(seed, 0.0, fastest=3.0)
+    t = np.arange(20_000) / RATE
+    found, _ = _coarse(moved.angle(t, 2e-4), moved.torque(t - 0.01 - 8e-4 * t, 0.01))
+    # Late by 10 to 26 samples; with a stiffness that varies alone it was 49 to 52.
+    assert abs(found - 18) < 25
+
+
 @pytest.mark.parametrize("drift", [1e-4, -3e-5])
 def test_a_drift_that_nobody_asked_for_is_said(drift: float) -> None:
     moved = Moved(1, 0.0)

@@ -36,6 +36,9 @@ _SHORTEST_SEARCH = 64
 _VARIES, _ROWS = 12, 100
 """Cosines over the record by which the stiffness may vary at any alignment, at most, and equations for each, at least."""
 
+_AS_GOOD = 1.5
+"""The alignment that is best for constants is taken where one that is better with such a stiffness leaves hardly less."""
+
 _ROUNDS = 3
 """Rounds of aligning with what was found."""
 
@@ -191,14 +194,18 @@ def _coarse(angle: npt.NDArray[np.number], torque: npt.NDArray[np.number]) -> tu
     size = 1 << (filtered.size + design.shape[0]).bit_length()
     spectrum = np.fft.rfft(filtered, size)
     count = 2 * farthest + 1
-    explained = np.zeros(count)
-    for column in basis.T:
+    explained, of_constants = np.zeros(count), np.zeros(count)
+    for number, column in enumerate(basis.T):
         products = np.fft.irfft(spectrum * np.conj(np.fft.rfft(column, size)), size)[:count]
         explained += products**2
+        of_constants += products**2 * (number <= len(columns))
     squares = np.concatenate([[0.0], np.cumsum(filtered**2)])
     energy = squares[design.shape[0] : design.shape[0] + count] - squares[:count]
-    left = 1 - explained / np.maximum(energy, np.finfo(float).tiny)
-    best = int(left.argmin())
+    left, left_by_constants = (1 - one / np.maximum(energy, np.finfo(float).tiny) for one in (explained, of_constants))
+    # What varies follows a wrong alignment nearly as well as clocks that drift leave the right one.
+    best, by_constants = int(left.argmin()), int(left_by_constants.argmin())
+    if left[by_constants] < _AS_GOOD * left[best]:
+        left, best = left_by_constants, by_constants
     return best - farthest, float(left[best] / max(float(np.median(left)), np.finfo(float).tiny))
 
 
