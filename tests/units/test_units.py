@@ -43,6 +43,10 @@ OTHER_NAMES = {
     "%": "percent",
     "mdeg": "millidegree",
     "millidegrees": "millidegree",
+    "rads": "radian",
+    "mrev": "milliturn",
+    **dict.fromkeys(("sek", "Sek", "Sekunde", "Sekunden"), "second"),
+    **dict.fromkeys(("Joule", "Joules"), "joule"),
     "sec": "second",
     "msec": "ms",
     "usec": "us",
@@ -90,6 +94,22 @@ def test_every_symbol_means_what_pint_says(symbol: str) -> None:
         ("DEG/SEC", "degree/s"),
         ("mSec", "ms"),
         ("hrs", "hour"),
+        *((text, "degree") for text in ("degs", "Degree(s)", "deg(s)", "DEGS")),
+        ("MDEG", "millidegree"),
+        *((text, "turn") for text in ("REV", "Revs")),
+        *((text, "kN") for text in ("KN", "kilonewton")),
+        *((text, "kN*m") for text in ("KNM", "kN * m")),
+        ("daNm", "daN*m"),
+        *((text, "mm") for text in ("MM", "millimeters")),
+        ("MN", "MN"),
+        ("MNm", "MN*m"),
+        ("COUNTS", "count"),
+        ("KHZ", "kHz"),
+        *((text, "second") for text in ("Sek.", "Sekunden")),
+        ("kg * m ** 2", "kg*m**2"),
+        ("kg m ^ 2", "kg*m**2"),
+        ("1 / ms", "1/ms"),
+        ("KG", "kg"),
     ],
 )
 def test_units_as_headers_write_them(text: str, pints: str) -> None:
@@ -194,6 +214,8 @@ def test_words_are_no_units(text: str) -> None:
         ("ms", ("ms", "ms")),
         ("millis", ("millis", "ms")),
         ("run.ms", ("run.ms", "")),
+        ("TIME [MS]", ("TIME", "ms")),
+        ("Time [MS]", ("Time", "MS")),
     ],
 )
 def test_names_and_units_are_told_apart(name: str, expected: tuple[str, str]) -> None:
@@ -255,6 +277,24 @@ def test_an_accelerometer_measures_in_g() -> None:
 def test_a_current_is_told_what_makes_a_torque_of_it(text: str) -> None:
     with pytest.raises(ValueError, match="multiplied by the torque of one A or V"):
         factor_to(ROTARY, "torque", text, name="the torque")
+
+
+@pytest.mark.parametrize(
+    ("quantity", "text", "cure"),
+    [
+        ("time", "MS", "time_unit='ms'"),
+        ("time", "[Ms]", "time_unit='ms'"),
+        ("time", "mS", "time_unit='ms'"),
+        ("angle", "Mrad", "angle_unit='mrad'"),
+        ("angle", "Mm", "angle_unit='mm'"),
+    ],
+)
+def test_a_capital_that_means_a_million_is_asked_for(quantity: str, text: str, cure: str) -> None:
+    """Megasiemens were taken for milliseconds, and megametres for millimetres, without a word."""
+    assert unit_of(text) is None
+    assert is_unit(text)
+    with pytest.raises(ValueError, match=f"must mean one thing.*{cure}"):
+        factor_to(ROTARY, quantity, text, name=f"the {quantity}")
 
 
 def test_slices_keep_their_unit_and_what_is_computed_has_none() -> None:

@@ -61,6 +61,8 @@ def named_unit(name: str) -> tuple[str, str]:
     found = _IN_BRACKETS.fullmatch(name)
     if found and found[1]:
         unit = next(one for one in found.groups()[1:] if one is not None).strip()
+        if unit == "MS" and found[1].isupper():
+            unit = "ms"  # all is in capitals, so that these say nothing
         inner, known = named_unit(found[1]) if unit_of(unit) is None else ("", "")
         if known and unit_of(known) is not None:
             return f"{inner} ({unit})", known

@@ -6,7 +6,17 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 
-from tvident._units.symbols import ALONE_IN_CAPITALS, IN_CAPITALS, LONGEST, NONE, ROTATIONS, SYMBOLS, Dimension
+from tvident._units.symbols import (
+    ALONE_IN_CAPITALS,
+    DOUBTFUL,
+    IN_CAPITALS,
+    LONGEST,
+    NEVER_JOINED,
+    NONE,
+    ROTATIONS,
+    SYMBOLS,
+    Dimension,
+)
 
 _LONGEST_TEXT = 60
 
@@ -19,6 +29,8 @@ _SAME = str.maketrans(
 
 _WORD = re.compile(r"[A-Za-z]+")
 _FACTOR = re.compile(r"([A-Za-z°%]+)(?:\^?\(?([+-]?[1-9])\)?)?")
+_POWER = re.compile(r"\s*\^\s*")
+_ONE_OVER = re.compile(r"1\s*/\s*")
 _BETWEEN = re.compile(r"\s*([/.]|-(?=[A-Za-z]))?\s*")
 
 _NO_UNIT = frozenset(("", "-", "--", "1", "none", "n/a", "a.u.", "[]", "()"))
@@ -35,7 +47,7 @@ class Unit:
 def is_unit(text: str) -> bool:
     """Return whether a cell of a header can be a unit, or says that there is none."""
     bare = text.strip().strip("[](){}<>").strip()
-    return bare.lower() in _NO_UNIT or unit_of(bare) is not None
+    return bare.lower() in _NO_UNIT or bare in DOUBTFUL or unit_of(bare) is not None
 
 
 @lru_cache(maxsize=256)
@@ -47,7 +59,7 @@ def unit_of(text: str) -> Unit | None:
     plain = raised.replace("**", "^").translate(_SAME).strip().strip("[]{}<>").strip()
     if plain.startswith("(") and plain.endswith(")"):
         plain = plain[1:-1].strip()
-    plain = plain.removesuffix(".")
+    plain = _POWER.sub("^", plain.removesuffix(".").removesuffix("(s)"))
     if "grad" in plain.lower():
         return None  # degrees in German, gon in French, and no gram
     speed = ROTATIONS.get(plain.lower().replace(".", ""))
@@ -60,14 +72,15 @@ def unit_of(text: str) -> Unit | None:
 def _in_usual_letters(text: str) -> str:
     """Return a unit as it is written usually, where another program wrote DEG, Sec or FT-LBS."""
     known = IN_CAPITALS if len(_WORD.findall(text)) > 1 else ALONE_IN_CAPITALS
-    return _WORD.sub(lambda found: known.get(found[0].lower(), found[0]), text)
+    return _WORD.sub(lambda found: found[0] if found[0] in DOUBTFUL else known.get(found[0].lower(), found[0]), text)
 
 
 def _product(text: str) -> Unit | None:
     """Read factors from left to right; what stands in brackets behind a slash divides as a whole."""
     factor, dimension, place, sign = 1.0, NONE, 0, 1
-    if text.startswith("1/"):
-        place, sign = 2, -1
+    one_over = _ONE_OVER.match(text)
+    if one_over is not None:
+        place, sign = one_over.end(), -1
     while place < len(text):
         if text[place] == "(":
             end = text.find(")", place)
@@ -98,7 +111,8 @@ def _symbols(word: str, power: int) -> Unit | None:
         factor, dimension = SYMBOLS[word]
         return Unit(factor**power, tuple(power * one for one in dimension))
     for length in range(min(len(word) - 1, LONGEST), 0, -1):
-        rest = _symbols(word[length:], power) if word[:length] in SYMBOLS else None
+        is_first = word[:length] in SYMBOLS and not NEVER_JOINED.intersection((word[:length], word[length:]))
+        rest = _symbols(word[length:], power) if is_first else None
         if rest is not None:
             factor, dimension = SYMBOLS[word[:length]]
             return Unit(factor * rest.factor, tuple(a + b for a, b in zip(dimension, rest.dimension, strict=True)))

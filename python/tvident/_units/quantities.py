@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from tvident._units.parse import Unit, unit_of
-from tvident._units.symbols import GRAVITY, NONE, Dimension
+from tvident._units.symbols import DOUBTFUL, GRAVITY, NONE, Dimension
 
 
 class UnitError(ValueError):
@@ -119,6 +119,12 @@ def factor_to(system: System, quantity: str, text: str | None, *, name: str) -> 
         raise UnitError(
             f"the unit of {name} must mean one thing; got {text!r}, a degree in German and the 400th part of a turn elsewhere; give "
             "angle_unit='deg' or angle_unit='gon'"
+        )
+    doubt = DOUBTFUL.get(text.strip("[](){}<> .")) if unit is None else None
+    if doubt is not None:
+        meant, _, _ = doubt.replace(",", "").partition(" ")
+        raise UnitError(
+            f"the unit of {name} must mean one thing; got {text!r}: {doubt}; give {quantity}_unit={meant!r}, or another"
         )
     if unit is None:
         raise UnitError(f"the unit of {name} must be one that is known; got {text[:_SHOWN]!r}; {cure}")

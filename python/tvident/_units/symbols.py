@@ -21,7 +21,9 @@ GRAVITY = 9.80665
 _POUND, _INCH = 0.45359237, 0.0254
 
 _SAME_IN_CAPITALS = (
-    *("deg", "degree", "degrees", "rad", "radian", "radians", "mrad", "revolution", "revolutions", "rpm"),
+    *("deg", "degs", "mdeg", "degree", "degrees", "rad", "rads", "radian", "radians", "mrad"),
+    *("rev", "revs", "mrev", "revolution", "revolutions", "rpm", "count", "counts", "cts"),
+    *("um", "kg", "hz", "khz", "sek", "sekunden", "pound", "pounds", "millimeter", "millimeters"),
     *(
         "sec",
         "secs",
@@ -59,28 +61,36 @@ _WITH_PREFIX: dict[str, tuple[float, Dimension]] = {
 }
 
 _ALONE: dict[tuple[str, ...], tuple[float, Dimension]] = {
-    ("radian", "radians"): (1.0, _ANGLE),
-    ("deg", "degree", "degrees", "°"): (math.pi / 180, _ANGLE),
+    ("radian", "radians", "rads"): (1.0, _ANGLE),
+    ("milliradian", "milliradians"): (1e-3, _ANGLE),
+    ("deg", "degs", "degree", "degrees", "°"): (math.pi / 180, _ANGLE),
     ("mdeg", "millidegree", "millidegrees"): (math.pi / 180_000, _ANGLE),
     ("Nms",): (1.0, (1, 2, -1, *NONE[3:])),
     ("gon",): (math.pi / 200, _ANGLE),
     ("arcmin",): (math.pi / 10_800, _ANGLE),
     ("arcsec",): (math.pi / 648_000, _ANGLE),
     ("rev", "revs", "revolution", "revolutions", "turn", "turns"): (2 * math.pi, _ANGLE),
+    ("mrev",): (2e-3 * math.pi, _ANGLE),
     ("rpm",): (math.pi / 30, (0, 0, -1, 1, *NONE[4:])),
     ("meter", "meters", "metre", "metres"): (1.0, _LENGTH),
+    ("centimeter", "centimeters", "centimetre", "centimetres"): (1e-2, _LENGTH),
+    ("millimeter", "millimeters", "millimetre", "millimetres"): (1e-3, _LENGTH),
     ("in", "inch", "inches"): (_INCH, _LENGTH),
     ("ft", "foot", "feet"): (12 * _INCH, _LENGTH),
-    ("second", "seconds", "secs"): (1.0, _TIME),
+    ("second", "seconds", "secs", "sek", "Sek", "Sekunde", "Sekunden"): (1.0, _TIME),
     ("millisecond", "milliseconds", "msecs"): (1e-3, _TIME),
     ("microsecond", "microseconds"): (1e-6, _TIME),
     ("nanosecond", "nanoseconds"): (1e-9, _TIME),
-    ("min", "minute", "minutes"): (60.0, _TIME),
+    ("min", "mins", "minute", "minutes"): (60.0, _TIME),
     ("h", "hr", "hrs", "hour", "hours"): (3600.0, _TIME),
     ("day", "days"): (86_400.0, _TIME),
-    ("lb", "lbs", "lbm"): (_POUND, _MASS),
-    ("oz",): (_POUND / 16, _MASS),
+    ("lb", "lbs", "lbm", "pound", "pounds"): (_POUND, _MASS),
+    ("oz", "ounce", "ounces"): (_POUND / 16, _MASS),
     ("newton", "newtons", "Newton", "Newtons"): (1.0, _FORCE),
+    ("daN",): (10.0, _FORCE),
+    ("kilonewton", "kilonewtons"): (1e3, _FORCE),
+    ("millinewton", "millinewtons"): (1e-3, _FORCE),
+    ("joule", "joules", "Joule", "Joules"): (1.0, _TORQUE),
     ("lbf",): (_POUND * GRAVITY, _FORCE),
     ("ozf",): (_POUND / 16 * GRAVITY, _FORCE),
     ("kgf", "kp"): (GRAVITY, _FORCE),
@@ -110,6 +120,20 @@ for _odd in ("dN", "dA", "cs", "ds", "ks", "Ms", "csec", "dsec", "ksec", "Msec",
 
 ALONE_IN_CAPITALS = {word: word for word in _SAME_IN_CAPITALS} | {"nm": "Nm", "nmm": "Nmm", "knm": "kNm", "kn": "kN"}
 """Symbols in small letters, and what they mean where capitals were written; where they alone are the unit, no short names of channels."""
+
+ALONE_IN_CAPITALS |= {"hz": "Hz", "khz": "kHz", "dan": "daN", "danm": "daNm"}
+
+DOUBTFUL = {
+    "MS": "ms in capitals, megasiemens as written",
+    "mS": "ms, millisiemens as written",
+    "Ms": "ms with a capital, megaseconds as written",
+    "Mm": "mm with a capital, megametres as written",
+    "Mrad": "mrad with a capital, megaradians as written",
+}
+"""Units in letters that mean two things, of which nobody measures the one that is written, and what they mean."""
+
+NEVER_JOINED = frozenset(("K",))
+"""Symbols that nothing is written to without a blank: KN is no K N."""
 
 IN_CAPITALS = ALONE_IN_CAPITALS | {word: word for word in ("s", "m", "cm", "lb", "oz", "in", "kg")} | {"n": "N"}
 
