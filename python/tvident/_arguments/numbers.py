@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tvident._arguments.measured import measured
 from tvident._arguments.shown import shown
 
 _BEYOND_COUNTING = 1 << 63
@@ -65,6 +66,8 @@ def real_number(name: str, value: object) -> float:
     """Return a real number; infinite where it is too large for a double."""
     number = _float(value)
     if number is None:
+        number = measured(name, value)
+    if number is None:
         raise TypeError(f"{name} must be a number; got {shown(value)}; pass a float")
     return number
 
@@ -73,6 +76,8 @@ def _float(value: object) -> float | None:
     """Return a real number as a double, or None for what is none."""
     if type(value) is float:
         return value
+    if type(value) is np.ndarray and value.size == 1 and value.dtype.kind in "iuf":
+        value = value.reshape(-1)[0]  # as MATLAB and HDF5 hold single numbers
     if not isinstance(value, Real) or isinstance(value, _NO_NUMBERS):
         return None
     try:

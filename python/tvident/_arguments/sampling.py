@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import re
+from typing import Any, cast
 
 import numpy.typing as npt
 
+from tvident._arguments.measured import knows_its_unit, measured
 from tvident._arguments.numbers import finite_number, positive_number, whole_number
 from tvident._arguments.shown import shown
 from tvident._arguments.times import period_of_times
@@ -42,6 +44,21 @@ def sample_period(
     if t is not None:
         return _possible("the step of t", period_of_times(times_in_seconds(t), samples))
     return 1.0 if delta is None else _possible("delta", positive_number("delta", delta))
+
+
+def in_unit_of_time(delta: Any, factor: float) -> float | None:
+    """Return a sample period in seconds that was given in another unit of time; what says its unit itself needs no other.
+
+    Raises
+    ------
+    TypeError
+        If it says its unit itself.
+    """
+    if delta is None or factor == 1:
+        return cast("float | None", delta)
+    if knows_its_unit(delta):
+        raise TypeError(f"delta says its unit itself; got {shown(delta)} beside time_unit=; leave time_unit out")
+    return positive_number("delta", delta) * factor
 
 
 def _possible(name: str, period: float) -> float:
@@ -99,9 +116,10 @@ def _time_in(text: str) -> float:
 
 
 def window_length(name: str, value: int | str, period: float, *, odd: bool) -> int:
-    """Return a length in samples from a number of samples or a duration such as ``"0.2 s"``."""
-    if isinstance(value, str):
-        samples = seconds(name, value) / period
+    """Return a length in samples from a number of samples or a duration such as ``"0.2 s"``, or one that knows its unit."""
+    duration = seconds(name, value) if isinstance(value, str) else _of_quantity(name, value)
+    if duration is not None:
+        samples = duration / period
         if not samples < _COUNTABLE:
             raise ValueError(
                 f"{name} must be less than or equal to the length of the record; got {shown(value)}, which is {samples:g} samples; "
@@ -117,11 +135,22 @@ def window_length(name: str, value: int | str, period: float, *, odd: bool) -> i
     return length
 
 
+def _of_quantity(name: str, value: object) -> float | None:
+    """Return the seconds of a duration that knows its unit, None where a length is none."""
+    duration = measured(name, value)
+    if duration is not None and not (math.isfinite(duration) and duration > 0):
+        raise ValueError(f"{name} must be samples or a duration above zero; got {shown(value)}; give '0.2 s', say")
+    return duration
+
+
 def length_given(name: str, value: object, *, odd: bool = False, least: int = 1) -> int | str:
     """Return a length as it was given, a number of samples or a duration, checked as far as it can be without a sample period."""
     if isinstance(value, str):
         seconds(name, value)
         return value
+    duration = _of_quantity(name, value)
+    if duration is not None:
+        return f"{duration!r} s"
     length = whole_number(name, value, least=least)
     return window_length(name, length, 1.0, odd=odd)
 

@@ -127,7 +127,8 @@ def identify(
         Samples per second. Give exactly one of `sample_rate`, `delta` and `t`, or an angle with an index of dates. Two numbers are
         the rates of angle and torque, which begin at the same time and may have different lengths; a list has one such pair a record.
     delta : float or (float, float)
-        Sample period in seconds; two of them, and lists, as rates.
+        Sample period in seconds; two of them, and lists, as rates. Rates, periods, lags and lengths of windows may be quantities of pint
+        or astropy, periods and lengths durations of Python, NumPy and pandas too.
     t : array_like, shape (n,)
         Time of every sample: seconds, dates or durations, which increase. Dates, in any time zone, become seconds from the first sample on.
         Where times are uniform to a thousandth of the sample period, or within the digits that they were printed with, only the sample

@@ -16,7 +16,7 @@ from tvident._clocks import Grid, Passed, TwoClocks, in_no_gap, two_clocks, weig
 from tvident._identify.aligned import Align, Aligned, Late, aligned
 from tvident._identify.data import Data
 from tvident._identify.weighted import Weights, weights_of
-from tvident._units import scaled
+from tvident._units import ROTARY, factor_to, scaled
 
 _LOOKED_AT = 1 << 10
 """Samples at the beginning in which a channel that was recorded more slowly shows it."""
@@ -289,7 +289,9 @@ def own_clocks(
         angle, of_angle = _without_empty_rows(angle, of_angle)
         torque, of_torque = _without_empty_rows(torque, of_torque)
     if name == "delta":
-        of_angle, of_torque = (1 / arguments.positive_number("delta", each) for each in (of_angle, of_torque))
+        unit = factor_to(ROTARY, "time", time_unit, name="the time")
+        periods = (arguments.in_unit_of_time(each, unit) for each in (of_angle, of_torque))
+        of_angle, of_torque = (1 / arguments.positive_number("delta", each) for each in periods)
     clocks = two_clocks(of_angle, of_torque, (angle, torque), time_unit, by_angle=by_angle)
     return OwnClocks(clocks, (angle, torque), align, propagate)
 

@@ -81,8 +81,9 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         propagate=call["nan_policy"] == "propagate",
         by_angle=is_strong(call["method"], call["settings"]) or _has_expansions(call),
     )
-    torque, weighted = call["torque"], None
+    torque, weighted, time_unit = call["torque"], None, call["time_unit"]
     if clocks is not None:
+        time_unit = time_unit if call["sample_rate"] is not None else None
         clocks, weighted = clocks.weighted(call["weights"], call["settings"], call["nan_policy"])
         measured["angle"], torque = clocks.channels()
         sampling = {"sample_rate": 1 / clocks.clocks.period, "delta": None, "t": None}
@@ -90,7 +91,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
     channels = dict(zip(measured, arrays, strict=True))
     channels = {name: scaled(values, _factor_of(name, call[name], axis)) for name, values in channels.items()}
     torques = scaled(torques, axis.torque)
-    seconds, grid, begin = _sampling(sampling, axis, call["time_unit"], first, next(iter(channels.values())))
+    seconds, grid, begin = _sampling(sampling, axis, time_unit, first, next(iter(channels.values())))
     if clocks is None:
         others = any(one is not None for one in beside_clocks.values())
         check_every_sample({**channels, "torque": torques}, seconds, others=others, in_parts="wanted" in call)

@@ -419,8 +419,7 @@ def sampled(
         )
     if time["t"] is not None:
         time["t"] = times_in_seconds(time["t"], time_unit, has_argument=True)
-    if time["delta"] is not None and axis.time != 1:
-        time["delta"] = arguments.positive_number("delta", time["delta"]) * axis.time
+    time["delta"] = arguments.in_unit_of_time(time["delta"], axis.time)
     period = arguments.sample_period(samples, **time)
     if time_unit is None or time["t"] is None:
         arguments.check_against_labels(channel, period)

@@ -1,0 +1,55 @@
+"""Numbers that know their unit: quantities of pint, astropy and unyt, durations of Python, NumPy and pandas."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import Any, Final
+
+import numpy as np
+
+from tvident._units import factor_between, in_its_unit, unit_said
+
+_UNITS: Final = {
+    "sample_rate": "Hz",
+    **dict.fromkeys(
+        ("delta", "duration", "lag", "align", "begin", "end", "t0", "t1", "start", "resolution", "more"), "s"
+    ),
+    **dict.fromkeys(("window_length", "regression_window", "half_life", "max_gap"), "s"),
+}
+"""In what numbers are taken that may be quantities."""
+
+_SECOND = np.timedelta64(1, "s")
+
+
+def knows_its_unit(value: object) -> bool:
+    """Return whether a single number says its unit itself, or is a duration."""
+    if type(value) is float or type(value) is int or isinstance(value, str):
+        return False
+    if isinstance(value, dt.timedelta | np.timedelta64):
+        return True
+    return bool(np.size(_plain(value)) == 1 and unit_said(value))
+
+
+def measured(name: str, value: Any) -> float | None:
+    """Return a quantity in the unit that an argument is taken in; None where it is none, or the argument has no unit.
+
+    Raises
+    ------
+    ValueError
+        If it is a quantity of another kind.
+    """
+    wanted = _UNITS.get(name)
+    if wanted is None or not knows_its_unit(value):
+        return None
+    if isinstance(value, dt.timedelta):
+        return value.total_seconds() if wanted == "s" else None
+    if isinstance(value, np.timedelta64):
+        return float(value / _SECOND) if wanted == "s" else None
+    factor = factor_between(unit_said(value), wanted, name=name)
+    return float(np.asarray(_plain(value), dtype=np.float64).reshape(-1)[0]) * factor
+
+
+def _plain(value: Any) -> Any:
+    """Return the number of a quantity without its unit."""
+    plain = in_its_unit(value)
+    return getattr(plain, "value", plain) if hasattr(plain, "unit") and not isinstance(plain, np.ndarray) else plain
