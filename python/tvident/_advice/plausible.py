@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from tvident._arguments import listed, told_once
+from tvident._arguments import listed, mark_in, told_once
 from tvident._results import Estimates, Words
 from tvident._units import ROTARY, Axis
 
@@ -70,6 +70,8 @@ class Plausible:
     def _far(self, angle: npt.NDArray[np.number]) -> list[str]:
         if "angle" not in self.axis.assumed or self.axis.system is not ROTARY:
             return []
+        if mark_in(angle / self.axis.angle) is not None:
+            return []  # which is asked for already
         is_finite = np.isfinite(angle)
         finite = angle if is_finite.all() else angle[is_finite]
         if not finite.size:

@@ -16,6 +16,7 @@ from tvident._arguments.digits import explained_in_words, ordinal, own_digits, p
 from tvident._arguments.labelled import check_against_labels, implied_times, is_called_time, is_time
 from tvident._arguments.labels import Labels, labels_in, labels_of, labels_out
 from tvident._arguments.lost import check_no_lost_samples
+from tvident._arguments.marks import CLOSE_TO_MARK, mark_in
 from tvident._arguments.numbers import (
     LARGEST,
     finite_number,
@@ -56,6 +57,7 @@ from tvident._arguments.wrapped import Unwrapped, unwrapped
 from tvident._choices import NanPolicy, RowPolicy
 
 __all__ = [
+    "CLOSE_TO_MARK",
     "LARGEST",
     "Labels",
     "NanPolicy",
@@ -97,6 +99,7 @@ __all__ = [
     "length_given",
     "listed",
     "mapping",
+    "mark_in",
     "mask",
     "nearest",
     "one_of",

@@ -8,13 +8,14 @@ import click
 
 from tvident._choices import TERM_NAMES
 from tvident._command_line.group import commands, main
-from tvident._command_line.options import CHANNELS, TIME
+from tvident._command_line.options import CHANNELS, MISSING, TIME
 
 
 @main.command(epilog="Example: tvident compare rig.csv --angle angle --torque torque --time time")
 @click.argument("file", type=click.Path(), required=False)
 @CHANNELS
 @TIME
+@MISSING
 @click.option(
     "--inertia", metavar="KIND", help="For all models: auto, constant, windowed, varying, a number, a channel."
 )

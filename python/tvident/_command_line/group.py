@@ -174,7 +174,7 @@ class _Command(click.Group):
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    click.echo(f"Warning: {_line(message)}", err=True)
+    click.echo(f"Warning: {commands().in_options(_line(message))}", err=True)
 
 
 def _show_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:  # noqa: FBT001 - an option's value

@@ -8,13 +8,14 @@ import click
 
 from tvident._choices import TERM_NAMES, RowPolicy
 from tvident._command_line.method import METHOD
-from tvident._command_line.options import BESIDE, CHANNELS, PERIOD, TIME, options_from_toml, options_of
+from tvident._command_line.options import BESIDE, CHANNELS, MISSING, PERIOD, TIME, options_from_toml, options_of
 
 IDENTIFICATION = options_of(
     CHANNELS,
     BESIDE,
     PERIOD,
     TIME,
+    MISSING,
     METHOD,
     click.option("--inertia", metavar="KIND", help="auto, constant, windowed, varying, a known number, or a channel."),
     click.option("--damping", metavar="KIND", help="The same for damping; 0 leaves it out."),

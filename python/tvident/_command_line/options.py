@@ -79,6 +79,22 @@ TIME = options_of(
     click.option("--time", "time_channel", metavar="NAME", help="Channel that holds the time in seconds."),
 )
 
+
+def _keep_marks(ctx: click.Context, _: click.Parameter, marks: tuple[float, ...]) -> None:
+    """Keep what marks missing values for whatever reads a file."""
+    ctx.meta["tvident.missing"] = marks
+
+
+MISSING = click.option(
+    "--missing",
+    type=float,
+    multiple=True,
+    expose_value=False,
+    callback=_keep_marks,
+    metavar="NUMBER",
+    help="Number that marks values that are missing, as -9999; repeat it for several.",
+)
+
 WORK = options_of(
     click.option("--step", type=int, default=1, show_default=True, help="Every how many samples a result is wanted."),
     click.option("--workers", type=int, help="Threads; by default all processors."),

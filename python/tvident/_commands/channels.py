@@ -94,7 +94,14 @@ def channels_in(file: str | None) -> recordings.Channels:
     """Return the channels of a file, of standard input where it is called ``-``, and none where there is none."""
     if file is None:
         return {}
-    return recordings.read(file) if file != "-" else _standard_input()
+    return recordings.read(file, missing=marks_missing()) if file != "-" else _standard_input()
+
+
+def marks_missing() -> tuple[float, ...]:
+    """Return the numbers that mark missing values, as --missing gave them."""
+    context = click.get_current_context(silent=True)
+    found: tuple[float, ...] = () if context is None else context.meta.get("tvident.missing", ())
+    return found
 
 
 def _standard_input() -> recordings.Channels:
@@ -113,7 +120,7 @@ def _standard_input() -> recordings.Channels:
             ending = ".xlsx"
         named = content.rename(content.with_name(f"standard-input{ending}"))
         try:
-            found = recordings.read(named)
+            found = recordings.read(named, missing=marks_missing())
         except recordings.FileError as error:
             raise recordings.FileError(str(error).replace(str(named), "standard input")) from None
     for one in said:
@@ -131,7 +138,7 @@ def source_of(channels: recordings.Channels, name: str, file: str | None) -> npt
                 raise
     elif Path(name).suffix == "":
         raise click.UsageError(f"channel {name!r} needs a FILE to be in; name the file first")
-    alone = recordings.read(name)
+    alone = recordings.read(name, missing=marks_missing())
     if len(alone) != 1:
         raise click.UsageError(
             f"{printable(name)} must hold one channel; it has {listed(alone)}; give it as FILE and name the channel"

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 import tvident
+from tvident._commands.channels import marks_missing
 from tvident._commands.equation import lag_of, terms_of
 from tvident._commands.given import given, wanted_progress
 from tvident._commands.method import NAMES, method_of
@@ -55,6 +56,10 @@ def identify_in_pieces(
         raise click.UsageError(
             "--in-pieces goes from a FILE to a file; got "
             f"{'a pipe' if '-' in (file, output) else 'none'}; name the file, and give -o"
+        )
+    if marks_missing():
+        raise click.UsageError(
+            "--in-pieces reads no marks of missing values; got --missing; write the file again with NaN in their place"
         )
     asked: dict[str, Any] = given(dict(options))
     refused = [

@@ -77,6 +77,8 @@ def options_from_toml(ctx: click.Context, path: str) -> str | None:
 
 def _as_typed(option: click.Parameter, value: Any) -> Any:
     """Return a value as it would be typed, where the option takes text."""
+    if option.multiple and not isinstance(value, list):
+        value = [value]
     if isinstance(value, list):
         return [_as_typed(option, one) for one in value]
     return str(value) if option.type is click.STRING and not isinstance(value, bool) else value

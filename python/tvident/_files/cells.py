@@ -30,8 +30,19 @@ _GROUPS = re.compile(
 _BLANKS = re.compile("[ '\u2019\u00a0\u2009\u202f]")
 
 _ONE_GROUP = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)
-_INFINITE = re.compile(r"([+-]?)(inf|infinity|1\.#inf)", re.IGNORECASE)
-_MISSING = re.compile(r"([+-]?nan|n/?a|-{1,3}|\*{1,12}|#n/[ad]|#nv|null|none|[+-]?1\.#(qnan|snan|ind))?", re.IGNORECASE)
+_INFINITE = re.compile(r"([+-]?)(inf|infinity|1[.,]#inf0*)", re.IGNORECASE)
+_MISSING = re.compile(
+    r"([+-]?nan(\((ind|snan)?\))?|n/?a|n\.a\.|<na>|-{1,3}|-{1,6}[.:]-{1,6}|\*{1,12}|#n/[ad]|#nv|\(?null\)?|none|nil"
+    r"|[+-]?1[.,]#((qnan|snan|ind)0*|[jrqi]|qo|io|qn|in))?",
+    re.IGNORECASE,
+)
+_NO_READING = re.compile(
+    r"[+-]?(ovld|ovl|o\.?l\.?|over|over[ _-]?load(ed)?|over[ _-]?flow|over[ _-]?range|out[ _-]of[ _-]range|under|under[ _-]?flow"
+    r"|under[ _-]?range|ovrng|open|no[ _-]?data|no[ _-]?value|invalid|missing|[?.])",
+    re.IGNORECASE,
+)
+"""What instruments write in place of a number that they could not measure."""
+
 _ERROR = (
     "#(?:n/a|n/d|nv|div/0|¡?(?:div/0|deel/0|дел/0|ref|bezug|rif|verw|ссылка|value|wert|valeur|valor|valore|waarde|arg|знач"
     "|num|zahl|nombre|getal|число|name|nom|nome|naam|имя|null|nul|nulo|leeg|пусто|calc|spill|field|überlauf)[!?])(?=\\s*(?:[\\t,;|\"']|$)|\\s+[-+.#\\d\"'])"
@@ -42,7 +53,9 @@ _IS_ERROR = re.compile(_ERROR, re.IGNORECASE)
 _NOT_AVAILABLE = re.compile("#(?:n/[ad]|nv)", re.IGNORECASE)
 """What a sheet writes on purpose, for a value that is missing."""
 
-_NOT_A_COMMENT = re.compile(rf"{_ERROR}|#(?:qnan|snan|ind|inf)\b", re.IGNORECASE | re.MULTILINE)
+_NOT_A_COMMENT = re.compile(
+    rf"{_ERROR}|(?<=1[.,])#(?:(?:qnan|snan|ind|inf)0*|[jrqi]|qo|io|qn|in)\b", re.IGNORECASE | re.MULTILINE
+)
 _BETWEEN_WORDS = re.compile(r"[,;|\s]+")
 _IN_QUOTES = re.compile(r'"[^"]*"|[^\s"]+')
 
@@ -90,6 +103,11 @@ def hides_numbers(text: str) -> bool:
     return "#" in text and _NOT_A_COMMENT.search(text) is not None
 
 
+def says_no_number(cell: str) -> bool:
+    """Return whether an instrument or a spreadsheet says in a cell that there is no number, and why."""
+    return is_error(cell) or _NO_READING.fullmatch(cell) is not None
+
+
 def is_error(cell: str) -> bool:
     """Return whether a spreadsheet says in a cell that a formula found no number."""
     return cell.startswith("#") and _IS_ERROR.fullmatch(cell) is not None and not _NOT_AVAILABLE.fullmatch(cell)
@@ -114,7 +132,7 @@ def number(cell: str, *, comma: bool, decimal: str | None = None) -> float | Non
     if plain is not None:
         value = float(plain)
         return value if math.isfinite(value) else None
-    if _MISSING.fullmatch(cell) or is_error(cell):
+    if _MISSING.fullmatch(cell) or says_no_number(cell):
         return math.nan
     infinite = _INFINITE.fullmatch(cell)
     return float(f"{infinite[1]}inf") if infinite else None

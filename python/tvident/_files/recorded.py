@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -312,7 +312,7 @@ def _check_no_counts(time: npt.NDArray[np.float64]) -> None:
             )
 
 
-def read_recording(path: str | Path) -> FileRecording:
+def read_recording(path: str | Path, *, missing: float | Sequence[float] = ()) -> FileRecording:
     """Read a recording from a file: its channels by name, with their units and the sample rate.
 
     Parameters
@@ -320,6 +320,8 @@ def read_recording(path: str | Path) -> FileRecording:
     path : str or Path
         Text (CSV, LabVIEW, OpenSim), NPY, NPZ, or what an extra reads: the ending says which. Units stand in names, as ``angle [deg]``,
         ``Torque (Nmm)`` or ``t/ms``, or in a line of their own.
+    missing : float or sequence of float, optional
+        Numbers that mark values that are missing, as -9999: they become NaN.
 
     Returns
     -------
@@ -360,7 +362,7 @@ def read_recording(path: str | Path) -> FileRecording:
     >>> result = tvident.identify(recording["angle"], recording["torque"], sample_rate=recording.sample_rate)
     """
     path = arguments.path_of("path", path)
-    channels = read(path)
+    channels = read(path, missing=missing)
     stated = stated_rate(path) if not time_channels(channels) and not increasing_times(channels) else None
     rate = None if stated is None else stated.rate
     return FileRecording(channels, sample_rate=rate, source=printable(path.name))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import stat
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import cast
@@ -13,6 +13,7 @@ from tvident import _arguments as arguments
 from tvident._files.beginnings import cure_of_name
 from tvident._files.channels import Channels, FileError, FileWarning, Say
 from tvident._files.names import printable
+from tvident._files.no_values import marks_given, said_of_marks, without_marks
 from tvident._files.unpacked import ending_of
 from tvident._formats import FORMATS
 
@@ -69,7 +70,7 @@ def check_readable(path: Path, endings: Iterable[str]) -> None:
         raise FileError(f"{place}: must be a file; it is a pipe or a device; save what it gives in a file first")
 
 
-def read(path: str | Path) -> Channels:
+def read(path: str | Path, *, missing: float | Sequence[float] = ()) -> Channels:
     """Read every numeric channel of a file.
 
     Parameters
@@ -77,6 +78,9 @@ def read(path: str | Path) -> Channels:
     path : str or Path
         A text file of columns, an NPY or NPZ file, or with an extra: Parquet, HDF5, MATLAB, TDMS, xlsx (``io``), MDF (``mdf``), universal
         files (``uff``), C3D (``c3d``), XDF (``xdf``), ROS bags and MCAP (``ros``).
+    missing : float or sequence of float, optional
+        Numbers that mark values that are missing, as -9999: they become NaN. One that is far from all other values of a channel is asked
+        for in a warning.
 
     Returns
     -------
@@ -105,9 +109,11 @@ def read(path: str | Path) -> Channels:
     decimal sign where semicolons, tabs or blanks separate cells, or numbers are in quotes. Thousands may be separated (``1,234.5``,
     ``1 234``); where a sign may be either, the other numbers of the file decide, or it is refused. Times (``12:30:00.5``,
     ``2024-12-31T12:30:00``) become seconds: of the day, or since the first where there are dates. Columns of words are not read, which is
-    said. An empty cell, ``nan``, ``NA`` or ``null`` is a missing value, and so is an error of a spreadsheet (``#DIV/0!``), which is said.
-    ``1.0D+03`` is a number of Fortran. Comments begin with #. Text that gzip packed (``.csv.gz``) is read as what it holds. Files of
-    LabVIEW (``.lvm``) and OpenSim (``.mot``, ``.sto``) have the units of their headers.
+    said.
+    An empty cell, ``nan``, ``NA`` or ``null`` is a missing value; so are errors of spreadsheets (``#DIV/0!``) and words of
+    instruments (``OVLD``, ``overflow``, ``No Data``), which is said. ``1.0D+03`` is a number of Fortran. Comments begin with #. Text that
+    gzip packed (``.csv.gz``) is read as what it holds. Files of LabVIEW (``.lvm``) and OpenSim (``.mot``, ``.sto``) have the units of
+    their headers.
 
     See Also
     --------
@@ -129,6 +135,7 @@ def read(path: str | Path) -> Channels:
     ['time [s]', 'angle [rad]', 'torque [N m]']
     """
     path = arguments.path_of("path", path)
+    marks = marks_given(missing)
     place = printable(path)
     check_readable(path, _READERS)
     said: list[str] = []
@@ -142,6 +149,8 @@ def read(path: str | Path) -> Channels:
         raise FileError(f"{place}: may not be read; check its permissions") from None
     except OSError as error:
         raise FileError(f"{place}: cannot be read ({error.strerror or error}); check that it is whole") from None
+    channels = {name: without_marks(values, marks) for name, values in channels.items()} if marks else channels
+    said += said_of_marks(channels)
     for message in said:
         warnings.warn(f"{place}: {message}", FileWarning, stacklevel=2)
     if not channels:

@@ -16,7 +16,6 @@ from tvident._files.cells import (
     decimal_sign,
     fortran_as_usual,
     hides_numbers,
-    is_error,
     is_present,
     is_remark,
     number,
@@ -28,6 +27,7 @@ from tvident._files.cut import what_lacks
 from tvident._files.dialect import Dialect
 from tvident._files.headers import CURE, not_a_number, not_a_time
 from tvident._files.names import printable
+from tvident._files.no_values import Unmeasured
 from tvident._files.times import TimeColumn, instant
 
 Numbers = npt.NDArray[np.float64]
@@ -93,9 +93,7 @@ class Rows:
         """Where columns of words have their first, and the word."""
         self._numbers: set[int] = set()
         """Columns without anything in the first lines that have numbers further below."""
-        self._error: tuple[int, int, str] | None = None
-        """Line, column and cell of the first error of a spreadsheet, of so many."""
-        self._error_count = 0
+        self._unmeasured = Unmeasured()
         self._before = ""
         """The end of the last piece."""
         self._cut = ""
@@ -173,13 +171,8 @@ class Rows:
             self._say(
                 f"column '{printable(self._dialect.names[column], 40)}': not read, it holds words{remark and ': ' + remark}"
             )
-        if self._error is not None:
-            place, column, cell = self._error
-            count = f"{self._error_count} cells hold errors" if self._error_count > 1 else "one cell holds an error"
-            name = printable(self._dialect.names[column], 40)
-            self._say(
-                f"{count} of a spreadsheet, read as missing: '{printable(cell, 40)}' in line {place}, column '{name}'"
-            )
+        for message in self._unmeasured.said():
+            self._say(message)
         if self._cut:
             self._say(self._cut)
         if self.hollow:
@@ -378,9 +371,8 @@ class Rows:
             raise FileError(not_a_number(place, d.names[column], cell))
         if math.isfinite(value):
             self._note_sign(place, cell)
-        elif is_error(cell):
-            self._error = self._error or (place, column, cell)
-            self._error_count += 1
+        else:
+            self._unmeasured.note(place, d.names[column], cell)
         return value
 
     def _note_remark(self, place: int, column: int, value: float | None) -> None:

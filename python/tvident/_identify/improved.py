@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tvident import _core
-from tvident._advice import NOT_DISTINGUISHED, Explained
+from tvident._advice import MARKED, NOT_DISTINGUISHED, Explained
 from tvident._arguments import percent
 from tvident._equation import BUILT_IN, COEFFICIENTS, FRICTION, OFFSET, Unknown
 from tvident._identify.data import Data, cut
@@ -144,6 +144,8 @@ class TriedInWeakForm(_AskedOfRecord):
 
     def words(self, _: Identification, words: Words) -> Words:
         """Return words that begin with what explains more in weak form, if anything does."""
+        if any(MARKED in line for _, line in self.data.doubts):
+            return words
         try:
             advice = self._in_weak_form(self._part()).advice
         except ValueError:
@@ -226,6 +228,8 @@ class Improvement(_AskedOfRecord):
 
     def words(self, result: Identification, words: Words) -> Words:
         """Return words that begin with what to change, without what was tried in vain."""
+        if any(MARKED in line for _, line in self.data.doubts):
+            return words  # whatever is tried would explain what was never measured
         if not (_is_contradicted(self.found) or self.found.record_status & Status.RANK_DEFICIENT):
             return self._without_worse_offset(result, words)
         trial = self._trial(result)

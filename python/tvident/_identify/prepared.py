@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
+from tvident._advice import marks_that_stay
 from tvident._clocks import Grid, grid_of
 from tvident._equation import COEFFICIENTS, LINEAR_UNITS, UNITS, has_kind
 from tvident._expansion import Expansion
@@ -81,9 +82,8 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         propagate=call["nan_policy"] == "propagate",
         by_angle=is_strong(call["method"], call["settings"]) or _has_expansions(call),
     )
-    torque, weighted, time_unit = call["torque"], None, call["time_unit"]
+    torque, weighted = call["torque"], None
     if clocks is not None:
-        time_unit = time_unit if call["sample_rate"] is not None else None
         clocks, weighted = clocks.weighted(call["weights"], call["settings"], call["nan_policy"])
         measured["angle"], torque = clocks.channels()
         sampling = {"sample_rate": 1 / clocks.clocks.period, "delta": None, "t": None}
@@ -91,6 +91,8 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
     channels = dict(zip(measured, arrays, strict=True))
     channels = {name: scaled(values, _factor_of(name, call[name], axis)) for name, values in channels.items()}
     torques = scaled(torques, axis.torque)
+    # Times of two clocks are in seconds by now.
+    time_unit = call["time_unit"] if clocks is None or call["sample_rate"] is not None else None
     seconds, grid, begin = _sampling(sampling, axis, time_unit, first, next(iter(channels.values())))
     if clocks is None:
         others = any(one is not None for one in beside_clocks.values())
@@ -108,13 +110,13 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
     weighted = weights_of(call["weights"], torques.shape) if clocks is None else weighted
     # What two clocks recorded was checked before; on the grid their gaps are no samples.
     channels, torques = usable_channels(channels, torques, weighted, call["nan_policy"] if clocks is None else "omit")
-    doubts: list[tuple[int, str]] = []
+    doubts = _marks(channels, torques, call, axis, seconds)
     turn = request.period
     if turn is not None:
         # Whole periods need not be multiples of the step that the angle was rounded to.
         request = with_own_step(request, channels)
         turned = arguments.unwrapped("angle", channels["angle"], turn)
-        channels["angle"], doubts = turned.longest("angle", split=request.counts_turns)
+        channels["angle"], doubts[len(doubts) :] = turned.longest("angle", split=request.counts_turns)
     propagate = call["nan_policy"] == "propagate"
     signals = Signals(
         channels,
@@ -248,6 +250,18 @@ def _check_attribute(name: str, values: Any, unit: str, factor: float) -> None:
             f"{name} must be in the unit of results where only an attribute says {unit!r}: arithmetic keeps attributes, so nobody knows "
             f"whether the numbers still are; pass tvident.Channel({name}, {unit!r}), or .to_numpy() if they were converted"
         )
+
+
+def _marks(
+    channels: Mapping[str, npt.NDArray[np.number]],
+    torques: npt.NDArray[np.number],
+    call: Mapping[str, Any],
+    axis: Axis,
+    period: float,
+) -> list[tuple[int, str]]:
+    """Return records and questions about numbers in them that may mark missing values."""
+    factors = {name: _factor_of(name, call[name], axis) for name in channels} | {"torque": axis.torque}
+    return marks_that_stay({**channels, "torque": torques}, factors, period)
 
 
 def _in_units_of_results(name: str, value: float | None, factor: float) -> float | None:

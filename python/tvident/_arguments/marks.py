@@ -1,0 +1,65 @@
+"""Numbers that mark values as missing: -9999, 1e20, the largest of a type."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+_NINES: Final = [float("9" * digits) for digits in range(2, 8)]
+_MARKS: Final = np.unique(
+    np.array(
+        [
+            *_NINES,
+            *(one + part for one in _NINES for part in (0.25, 0.9, 0.99, 0.999)),
+            *(10.0**power for power in range(10, 39)),
+            *(9.9 * 10.0**power for power in (34, 35, 36, 37)),
+            9.969209968386869e36,  # netCDF
+            *(2.0**power for power in (15, 16, 31, 32, 63)),
+            *(2.0**power - 1 for power in (15, 16, 31, 32)),
+            *(float(np.finfo(kind).max) for kind in (np.float32, np.float64)),
+        ]
+    )
+)
+"""Sizes of numbers that programs write where nothing was measured: -9999, -999.25, 1e20, 32767, the largest of a type."""
+
+_NO_MARKS: Final = (99.0, 99.9, 99.99, 99.25, 99.999)
+"""Numbers that are measured more often than they are marks; -99 is one."""
+
+_FAR = 1.0
+"""By how many times the range of all other values a mark is beyond them."""
+
+CLOSE_TO_MARK = 1e-6
+"""Relative: numbers with 7 digits, or of 32 bits, are no others."""
+
+_LARGEST_PART = 0.9
+"""Of the samples of a channel, from which on marks are what was measured."""
+
+_FEWEST = 8
+"""Other values, below which nothing is far from them."""
+
+
+@np.errstate(over="ignore")
+def mark_in(values: npt.NDArray[np.number]) -> tuple[float, int] | None:
+    """Return a number that may mark missing values, far from all others of a channel, and how often it occurs; None where none does."""
+    if values.ndim != 1 or values.dtype.kind not in "iuf" or values.size < _FEWEST:
+        return None
+    are_finite = np.isfinite(values)
+    finite = values if are_finite.all() else values[are_finite]
+    if finite.size < _FEWEST:
+        return None
+    for mark in {float(finite.min()), float(finite.max())}:
+        others = finite[finite != mark] if _is_mark(mark) else finite[:0]
+        if others.size < max(_FEWEST, (1 - _LARGEST_PART) * finite.size):
+            continue
+        low, high = float(others.min()), float(others.max())
+        beyond = low - mark if mark < low else mark - high
+        if beyond > _FAR * (high - low) and high > low:
+            return mark, finite.size - others.size
+    return None
+
+
+def _is_mark(value: float) -> bool:
+    """Return whether programs write a number where nothing was measured."""
+    return value not in _NO_MARKS and bool(np.isclose(_MARKS, abs(value), rtol=CLOSE_TO_MARK, atol=0).any())
