@@ -13,6 +13,7 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident._files import FileError, printable, read_result
 from tvident._merged.elements import Element
+from tvident._merged.held_back import HeldBackTorque
 from tvident._merged.merging import Identifiable, Merging
 from tvident._merged.result import MergedIdentification
 from tvident._merged.sampling import Sampling
@@ -112,9 +113,16 @@ def _restored(arrays: Mapping[str, Any], facts: Mapping[str, Any]) -> MergedIden
             covariances[one, other] = arrays[f"{one}_stderr"] ** 2
         else:
             covariances[one, other] = arrays[f"covariance {number}"] if value is None else np.broadcast_to(value, size)
+    # Files of before do not say what of the recording is explained.
+    compared = (
+        {"_held_back": _held_back_from(facts["held_back"]), "_share": facts["explained"]}
+        if "held_back" in facts
+        else {}
+    )
     return MergedIdentification.of_known(
         merging,
         {
+            **compared,
             "time": arrays["time"],
             "phase": arrays.get("phase"),
             "elements": {name: arrays[name] for name in names},
@@ -138,3 +146,9 @@ def _restored(arrays: Mapping[str, Any], facts: Mapping[str, Any]) -> MergedIden
             "_covariances": covariances,
         },
     )
+
+
+def _held_back_from(plain: Mapping[str, Any]) -> HeldBackTorque:
+    """Return what a file says of parts that were held back."""
+    shares = {name: np.asarray(plain[name], np.float64) for name in ("predicted", "simulated")}
+    return HeldBackTorque(**shares, parts=plain["parts"], why_not=plain["why_not"])

@@ -19,7 +19,7 @@ from tvident._merged.merging import Identifiable, Merging
 from tvident._merged.predicted import predicted
 from tvident._merged.simulated import MergedSimulated
 from tvident._merged.stored import store
-from tvident._merged.verdict import verdict_of
+from tvident._merged.verdict import explained, verdict_of
 from tvident._merged.words import summary_of, words_of
 from tvident._results import Measured, Scan, Telling, Words, every_sample, known_name, number_of
 from tvident._status import Status
@@ -155,6 +155,11 @@ class Reported(MergedSimulated, Telling, Tabular):
             both[:, list(part.equations.numbers)] = found
         recorded, expected = both if merging.masses else both[:, 0]
         return merging.sampling.times(both.shape[2]), recorded, expected
+
+    @cached_property
+    def _share(self) -> float | None:
+        """The least share of a torque's variance that is explained; it is kept where the recording is not."""
+        return explained(self, self._merging)
 
     @cached_property
     def _held_back(self) -> HeldBackTorque:

@@ -232,7 +232,8 @@ class MergedIdentification(Oscillating, Reported):
     def __getstate__(self) -> dict[str, Any]:
         # A record may be long, and functions cannot be stored; what was found of it stays.
         sampling = self._merging.sampling.of_result
-        known = {"_covariances": self._covariances, "_told": self._told}
+        compared = {"_held_back": self._held_back, "_share": self._share}
+        known = {"_covariances": self._covariances, "_told": self._told, **compared}
         return {
             **self.__dict__,
             **known,

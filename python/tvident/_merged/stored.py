@@ -55,6 +55,8 @@ def store(path: Path, result: Any) -> None:
         "trial_spread": {name: [one.tolist() for one in pair] for name, pair in result.trial_spread.items()},
         "identifiable": {name: asdict(one) for name, one in result.identifiable.items()},
         "record_status": int(result.record_status),
+        "held_back": {name: np.asarray(one).tolist() for name, one in asdict(result.held_back()).items()},
+        "explained": result._share,  # noqa: SLF001 - of this room
         "words": plain_words(result._told),  # noqa: SLF001 - of this room
         "scans": [plain_scan(scan) for scan in result.scans],
         "between": between,

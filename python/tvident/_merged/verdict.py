@@ -35,7 +35,7 @@ def verdict_of(result: Any, merging: Merging) -> str:
     asked = [one.name for one in merging.elements if not one.is_known]
     if len(lost) == len(asked):
         return verdict_of_distrusted(result, "nothing can be known of what was asked")
-    share = _explained(result, merging)
+    share: float | None = result._share  # noqa: SLF001 - of this room
     reason = why_not(result, lambda: _sign(result, merging), lambda: share)
     if reason:
         return verdict_of_distrusted(result, reason)
@@ -72,8 +72,13 @@ def _known(result: Any, merging: Merging) -> str:
     return ", ".join(filter(None, (words, f"{lost[0]}{more} not told from zero" if lost else "")))
 
 
-def _explained(result: Any, merging: Merging) -> float | None:
-    """Return the least share of a torque's variance that the equations predict; None where the record is not there."""
+def explained(result: Any, merging: Merging) -> float | None:
+    """Return the least share of a torque's variance that the equations predict; None where the record is not there.
+
+    See Also
+    --------
+    verdict_of : says it.
+    """
     if not merging.parts:
         return None
     both = [[np.atleast_2d(one) for one in result.predicted_torque(trial)[1:]] for trial in range(merging.trials)]

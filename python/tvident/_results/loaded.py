@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tvident._results.kept import explained_from, held_back_from
 from tvident._results.records import IdentifiedRecords, Shared
 from tvident._results.result import Identification
 from tvident._results.stored import restored, words_from
@@ -25,7 +26,7 @@ def from_file(place: str, arrays: dict[str, npt.NDArray[Any]], facts: Mapping[st
     """
     found = restored(place, arrays, facts)
     several = found.status.ndim > 1
-    return Identification(
+    result = Identification(
         found,
         time=arrays["time"],
         terms=list(facts["terms"]),
@@ -33,6 +34,10 @@ def from_file(place: str, arrays: dict[str, npt.NDArray[Any]], facts: Mapping[st
         words=words_from(facts["words"]),
         settings=facts["settings"],
     )
+    # Files of before have none.
+    result._held_back = held_back_from(facts.get("compared"))  # noqa: SLF001 - of this room
+    result._explained_each = explained_from(facts.get("compared"))  # noqa: SLF001 - likewise
+    return result
 
 
 def list_from_file(place: str, arrays: Mapping[str, npt.NDArray[Any]], facts: Mapping[str, Any]) -> IdentifiedRecords:

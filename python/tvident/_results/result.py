@@ -14,6 +14,7 @@ from tvident._arguments import told_once, whole_number
 from tvident._results.curve import ExpandedParameter
 from tvident._results.estimates import Estimates
 from tvident._results.held_back import HeldBack
+from tvident._results.kept import comparisons
 from tvident._results.oscillator import Oscillator
 from tvident._results.parts import (
     At,
@@ -29,6 +30,7 @@ from tvident._results.recorded import Recorded
 from tvident._results.scan import Scan
 from tvident._results.shown import Shown
 from tvident._results.standard_errors import StandardErrors
+from tvident._results.verdict import ExplainedTorque
 from tvident._results.words import Words, of_batch
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD
 
@@ -117,6 +119,8 @@ class Identification(Shown):
         recorded: Recorded | None = None,
     ) -> None:
         super().__init__(recorded)
+        self._explained_each: Sequence[ExplainedTorque | None] | None = None
+        """How much of the torque of every record is explained, of a result whose recording is not there."""
         self.expansions: dict[str, ExpandedParameter] = dict(found.expansions)
         self.units = found.units
         self.time = time
@@ -201,7 +205,13 @@ class Identification(Shown):
 
     def __getstate__(self) -> dict[str, Any]:
         # What finds the words knows the record.
-        return super().__getstate__() | {"_words": self._told}
+        kept = {"_words": self._told, "_held_back": self.held_back(), "_explained_each": comparisons(self)}
+        return super().__getstate__() | kept
+
+    @property
+    def _explained_before(self) -> ExplainedTorque | None:
+        """How much of the torque of the only record was explained where its recording was."""
+        return self._explained_each[0] if self._explained_each and self.inertia.ndim == 1 else None
 
     # What to say is found when it is asked for: a short record is identified in less time than that takes.
     @cached_property
@@ -297,7 +307,7 @@ class Identification(Shown):
             time=self.time[samples],
             terms=list(self.terms),
             jumps=tuple(jumps) if self.inertia.ndim > 1 else jumps[0],
-            words=self._words,
+            words=lambda: self._told,
             settings=self.settings,
         )
         part._held_back = HeldBack(why_not="this is a part of a result; ask the whole")
@@ -317,7 +327,7 @@ class Identification(Shown):
         words = self._told
         each = [words.each[record] for record in records] if words.each else []
         jumps = tuple(self.jumps[record] for record in records)
-        return Identification(
+        one = Identification(
             found,
             time=self.time,
             terms=list(self.terms),
@@ -326,3 +336,6 @@ class Identification(Shown):
             settings=settings_of(self.settings, records, found.kinds, alone=alone),
             recorded=None if self._recorded is None else self._recorded.of(place),
         )
+        if self._explained_each is not None:
+            one._explained_each = [self._explained_each[record] for record in records]
+        return one

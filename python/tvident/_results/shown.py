@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._files import check_beside, keeps_result, write_settings, write_table
+from tvident._results.kept import plain_comparison
 from tvident._results.scan import Scan
 from tvident._results.short import as_html, short
 from tvident._results.simulated import Simulated
@@ -130,7 +131,8 @@ class Shown(Simulated, Telling, Valued):
 
     def _rest(self) -> dict[str, Any]:
         """Return what files hold beside numbers."""
-        return {"terms": list(self.terms), "jumps": self.jumps, "words": plain_words(self._told)}
+        words = plain_words(self._told)
+        return {"terms": list(self.terms), "jumps": self.jumps, "words": words, "compared": plain_comparison(self)}
 
     def summary(self) -> str:
         """Return a table of the parameters, and in words what was chosen and what to do.

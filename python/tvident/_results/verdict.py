@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -46,8 +47,29 @@ _DOUBTS = (
 _CARRIED = Status.GAP | Status.ILL_CONDITIONED
 """Flags of a sample in a gap that is farther from any equation than a window tells."""
 
-_RECORDS = 100
+RECORDS = 100
 """Of a batch that are looked at."""
+
+
+@dataclass(frozen=True)
+class ExplainedTorque:
+    """How much of the torque of a record its model explains, kept where the recording is not.
+
+    Parameters
+    ----------
+    share : float or None
+        Of the variance; None where that is not known.
+    is_rest_noise : bool
+        Whether the rest is no more than the torque's noise.
+    """
+
+    share: float | None
+    is_rest_noise: bool
+
+
+def explained_of(result: Any) -> ExplainedTorque:
+    """Return how much of the torque of one record is explained, as the verdict asks."""
+    return ExplainedTorque(explained(result), _is_rest_noise(result))
 
 
 def verdict(result: Any, share: float | None = None) -> str:
@@ -62,7 +84,7 @@ def _verdict(result: Any, share: float | None) -> str:
         return _of_one(result, share)
     shape = result.inertia.shape[:-1]
     count = int(np.prod(shape, dtype=int))
-    places = list(np.ndindex(shape))[:_RECORDS]
+    places = list(np.ndindex(shape))[:RECORDS]
     reasons = {place: reason for place in places if (reason := distrust(result[place if len(place) > 1 else place[0]]))}
     known = _errors(result)
     words = f"{count} records: {known}" if known else f"{count} records"
@@ -113,6 +135,9 @@ def verdict_of_trusted(result: Any, known: str, share: float | None) -> str:
 
 def explained(result: Any) -> float | None:
     """Return the share of the torque's variance that a record's model predicts; None where the record is not there."""
+    before: ExplainedTorque | None = result._explained_before  # noqa: SLF001 - of this room
+    if before is not None:
+        return before.share
     try:
         _, recorded, predicted = result.predicted_torque()
     except ValueError:
@@ -134,6 +159,9 @@ def _is_rest_noise(result: Any) -> bool:
 
     What changes follows noise as well.
     """
+    before: ExplainedTorque | None = result._explained_before  # noqa: SLF001 - of this room
+    if before is not None:
+        return before.is_rest_noise
     if CHANGING & set(result.settings["kinds"].values()):
         return False
     kept = result._recorded  # noqa: SLF001 - the channel itself, beside what is compared
