@@ -13,7 +13,7 @@ from tvident._arguments.arrays import (
 from tvident._arguments.channels import as_record, channel, channels
 from tvident._arguments.containers import fields_of, is_table, package_of, plain, time_axis
 from tvident._arguments.digits import explained_in_words, ordinal, own_digits, percent, to_digits_of, with_error
-from tvident._arguments.labelled import check_against_labels, implied_times, is_called_time, is_time
+from tvident._arguments.labelled import check_against_labels, cure_by_labels, implied_times, is_called_time, is_time
 from tvident._arguments.labels import Labels, labels_in, labels_of, labels_out
 from tvident._arguments.lost import check_no_lost_samples
 from tvident._arguments.marks import CLOSE_TO_MARK, mark_in
@@ -78,6 +78,7 @@ __all__ = [
     "check_power",
     "check_window",
     "clock_changed",
+    "cure_by_labels",
     "delay",
     "explained_in_words",
     "fields_of",

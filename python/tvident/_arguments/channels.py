@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 from tvident._arguments.arrays import real_array
-from tvident._arguments.containers import time_axis, time_last
+from tvident._arguments.containers import is_table, time_axis, time_last
+from tvident._arguments.labelled import is_called_time
 from tvident._arguments.labels import aligned_with
+from tvident._units import named_unit
+
+_MOST_NAMES = 6
+"""Columns that a message lists."""
 
 _NO_RECORD = 32
 """Samples that no record of a batch is shorter than."""
@@ -29,6 +37,7 @@ def channels(**values: npt.ArrayLike) -> list[npt.NDArray[np.number]]:
     ValueError
         If shapes differ, or the first axis seems to be time.
     """
+    _check_no_whole_tables(values)
     first = next(iter(values.items()))
     arrays = {name: channel(name, aligned_with(first, (name, value))) for name, value in values.items()}
     shapes = {name: array.shape for name, array in arrays.items()}
@@ -49,6 +58,27 @@ def channels(**values: npt.ArrayLike) -> list[npt.NDArray[np.number]]:
             f"pass {' and '.join(f'{name}.T' for name in arrays)}"
         )
     return list(arrays.values())
+
+
+def _check_no_whole_tables(values: Mapping[str, Any]) -> None:
+    """Refuse a table that was given for several channels, or that holds times: its columns would be records."""
+    # What is lazy works for its names, and is refused later.
+    there = {name: value for name, value in values.items() if hasattr(value, "to_numpy") and is_table(value)}
+    tables = {name: value for name, value in there.items() if len(value.columns) > 1}
+    for name, table in tables.items():
+        columns = [str(one) for one in table.columns]
+        times = [one for one in columns if is_called_time(named_unit(one)[0])]
+        again = [other for other, value in tables.items() if value is table and other != name]
+        if not times and not again:
+            continue
+        which = f"{name} and {again[0]} are one table" if again else f"{name} is a table"
+        held = f", of which {times[0]!r} is called as times are" if times else ""
+        others = [one for one in columns if one not in times] or columns
+        own = next((one for one in others if name in one.casefold()), others[0])
+        raise TypeError(
+            f"a channel must be one column, or a table with a column for each record; {which} of {', '.join(columns[:_MOST_NAMES])}{held}; "
+            f"pass one column for each channel, {name} as table[{own!r}], say"
+        )
 
 
 def as_record(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[np.number]:

@@ -26,18 +26,41 @@ _UNITS = (1.0, 1e-3, 1e-6, 1e-9, 60.0, 3600.0, 86400.0)
 
 
 def implied_times(values: Any) -> Any:
-    """Return the times that a container says its samples have: an index of dates or durations; None where it has none.
+    """Return the times that a container says its samples have; None where it has none.
 
-    Plain numbers are none, since nobody says whether they are seconds. With xarray the attribute ``units`` may say so.
+    They are dates, durations, or numbers that are called as times: with their unit, or in seconds if they are no whole numbers.
+
+    Other plain numbers are none, since nobody says whether they are seconds. With xarray the attribute ``units`` may say so.
     """
-    if package_of(values) == "pandas" and hasattr(values, "index"):
-        return values.index if _says_times(values.index) else None
-    if package_of(values) == "xarray" and hasattr(values, "dims"):
-        for dim in values.dims:
-            coordinate = values.coords.get(dim)
-            if coordinate is not None and _says_times(coordinate):
-                return coordinate
+    for name, labels in _labels(values):
+        if _says_times(labels) or _is_named_time(name, labels):
+            return labels
     return None
+
+
+def cure_by_labels(values: Any) -> str:
+    """Return what to give if the numbers that label samples are times, though nobody says so; nothing where there are none."""
+    for name, labels in _labels(values):
+        numbers = np.asarray(labels)
+        if numbers.ndim != 1 or numbers.dtype.kind not in "iuf" or numbers.size < 2:  # noqa: PLR2004 - a step
+            continue
+        step = float(numbers[-1] - numbers[0]) / (numbers.size - 1)
+        # What counts samples is no time.
+        if not step > 0 or numbers.dtype.kind != "f":
+            continue
+        times = "angle.index" if package_of(values) == "pandas" else f"angle[{name!r}]"
+        unit = f" if they are seconds ({1 / step:.6g} Hz), and time_unit='ms' too if they are milliseconds"
+        return f"; the samples are labelled in steps of {step:.6g}: give t={times}{unit}"
+    return ""
+
+
+def _labels(values: Any) -> list[tuple[Any, Any]]:
+    """Return what labels the samples of a container, and how it is called."""
+    if package_of(values) == "pandas" and hasattr(values, "index"):
+        return [(getattr(values.index, "name", None), values.index)]
+    if package_of(values) == "xarray" and hasattr(values, "dims") and hasattr(values, "coords"):
+        return [(dim, values.coords[dim]) for dim in values.dims if dim in values.coords]
+    return []
 
 
 def _says_times(labels: Any) -> bool:
@@ -48,6 +71,20 @@ def _says_times(labels: Any) -> bool:
     return kind in "iuf" and is_convertible(ROTARY, "time", unit_said(labels))
 
 
+def _is_named_time(name: Any, labels: Any) -> bool:
+    """Return whether numbers are called as times: with a unit, or without one where they are fractions, as whole ones may count samples."""
+    kind = getattr(getattr(labels, "dtype", None), "kind", "O")
+    bare, unit = named_unit(name) if isinstance(name, str) else ("", "")
+    if kind not in "iuf" or unit_said(labels):
+        return False
+    return is_time(bare, unit) and (bool(unit) or (kind == "f" and _has_fractions(labels)))
+
+
+def _has_fractions(labels: Any) -> bool:
+    numbers = np.asarray(labels, dtype=np.float64)
+    return bool((numbers != np.round(numbers)).any())
+
+
 def check_against_labels(values: Any, period: float) -> None:
     """Refuse a sample period that is another than what a container says its samples have.
 
@@ -56,7 +93,7 @@ def check_against_labels(values: Any, period: float) -> None:
     ValueError
         If both the mean and the median step of the labels are far from it.
     """
-    implied = implied_times(values)
+    implied = next((labels for _, labels in _labels(values) if _says_times(labels)), None)
     if implied is None:
         _check_against_numbers(values, period)
     if implied is None or len(implied) < 2:  # noqa: PLR2004 - a step
@@ -92,12 +129,7 @@ def _check_against_numbers(values: Any, period: float) -> None:
 
 def _called_times(values: Any) -> tuple[npt.NDArray[np.float64], tuple[float, ...]]:
     """Return numbers that label samples and are called as times are, none where there are none, and seconds of what they may be in."""
-    found: list[tuple[Any, Any]] = []
-    if package_of(values) == "pandas" and hasattr(values, "index"):
-        found = [(values.index.name, values.index)]
-    elif package_of(values) == "xarray" and hasattr(values, "dims"):
-        found = [(dim, values.coords[dim]) for dim in values.dims if dim in values.coords]
-    for name, labels in found:
+    for name, labels in _labels(values):
         bare, unit = named_unit(name) if isinstance(name, str) else ("", "")
         unit = unit or unit_said(labels)
         is_numbers = getattr(getattr(labels, "dtype", None), "kind", "O") in "iuf"

@@ -124,8 +124,9 @@ def identify(
     torque : array_like, same shape
         Torque in N m.
     sample_rate : float or (float, float)
-        Samples per second. Give exactly one of `sample_rate`, `delta` and `t`, or an angle with an index of dates. Two numbers are
-        the rates of angle and torque, which begin at the same time and may have different lengths; a list has one such pair a record.
+        Samples per second. Give exactly one of `sample_rate`, `delta` and `t`, or an angle with an index of dates, or of seconds that is
+        called `t` or `time` (``time [s]``), as coordinates of xarray may be. Two numbers are the rates of angle and torque, which begin at
+        the same time and may have different lengths; a list has one such pair a record.
     delta : float or (float, float)
         Sample period in seconds; two of them, and lists, as rates. Rates, periods, lags and lengths of windows may be quantities of pint
         or astropy, periods and lengths durations of Python, NumPy and pandas too.

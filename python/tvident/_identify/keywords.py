@@ -12,6 +12,11 @@ from tvident import _arguments as arguments
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _Form = TypeVar("_Form", bound=type)
 
+_CHANNELS = frozenset(("angle", "torque"))
+
+_MOST_NAMES = 6
+"""Channels that a message lists."""
+
 _FORMS: dict[str, frozenset[str]] = {}
 """The settings of each form, by its name."""
 
@@ -22,6 +27,7 @@ _CALLED = {
     "fs": "sample_rate= in Hz",
     "rate": "sample_rate= in Hz",
     "dt": "delta= in seconds",
+    "data": "channels of it: identify(data['angle'], data['torque'], …)",
     "time": "t= in seconds",
     "times": "t= in seconds",
 }
@@ -55,9 +61,22 @@ def explained(function: _Function, called: str = "identify") -> _Function:
         if not known.issuperset(options):
             name = next(name for name in options if name not in known)
             raise TypeError(f"{called} has no option {arguments.shown(name)}; {_right(name, known)}")
+        lacking = [name for name in in_order[len(args) :] if name in _CHANNELS and name not in options]
+        if lacking:
+            raise TypeError(_both_channels(called, args[0] if args else None))
         return function(*args, **options)
 
     return call  # type: ignore[return-value]  # takes what the function takes
+
+
+def _both_channels(called: str, given: Any) -> str:
+    """Return what to write where angle or torque is not given: of a table or a recording two of its channels."""
+    wanted = f"{called} needs angle and torque"
+    names = [str(name) for name in given] if hasattr(given, "keys") or arguments.is_table(given) else []
+    if not names:
+        return f"{wanted}; got {'one channel' if given is not None else 'none'}; write {called}(angle, torque, sample_rate=1000), say"
+    some = ", ".join(names[:_MOST_NAMES]) + (" …" if len(names) > _MOST_NAMES else "")
+    return f"{wanted}, two channels; got what holds {some}; write {called}(data['angle'], data['torque'], sample_rate=1000), say"
 
 
 def _name_of(value: Any) -> str:

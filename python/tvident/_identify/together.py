@@ -409,8 +409,9 @@ def sampled(
     if all(value is None for value in time.values()):
         implied = None if channel is None else arguments.implied_times(channel)
         if implied is None:
-            raise TypeError("identify needs the sample period; got none; give sample_rate=, delta= or t=")
-        implied = times_in_seconds(implied, has_argument=True)
+            cure = "" if channel is None else arguments.cure_by_labels(channel)
+            raise TypeError(f"identify needs the sample period; got none; give sample_rate=, delta= or t={cure}")
+        implied = times_in_seconds(implied, time_unit, has_argument=True)
         return arguments.sample_period(samples, t=implied), implied
     if time_unit is not None and time["sample_rate"] is not None:
         raise TypeError(
