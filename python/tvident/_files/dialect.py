@@ -23,6 +23,14 @@ _SEPARATORS: tuple[Separator, ...] = (",", ";", "\t", "|", None)
 _SEARCHED, _SEARCHED_FOR_WORDS = 100, 2000
 """Lines that are looked at for what makes them odd, and for the first of a table with columns of words."""
 
+_NOTES, _FEW = 3, 10
+"""Cells of a column that are notes beside the table, and rows that are more."""
+
+_FEWEST_COUNTED = 3
+"""Columns whose numbers are no chance."""
+
+_FRACTION = re.compile(r"\d[.,]\d")
+
 _BEGINS_AS_NUMBER = re.compile(r"[+-]?[.,]?[0-9]")
 
 _HOLDS_CELLS = re.compile(r"[,;]\s*[+-]?\d")
@@ -78,7 +86,11 @@ def dialect_of(lines: Sequence[str], say: Say) -> Dialect | None:
     starts = _starts(lines)
     # Single numbers are lines of numbers only where nothing separates any; of equals the first.
     several = [one for one in starts if len(one.cells) > 1]
-    start = max(several or starts, key=lambda one: one.agree, default=None)
+    most = max((one.agree for one in several or starts), default=0)
+    # A note beside the first rows costs one separator a row or two, and blanks none, where empty cells are no cells.
+    start = next(
+        (one for one in several or starts if one.agree >= max(1, most - _NOTES if most > _FEW else most)), None
+    )
     start = _with_words(lines) if start is None else replace(start, first=_back(lines, start.first, start.separator))
     if start is None:
         return None
@@ -126,7 +138,7 @@ def _starts(lines: Sequence[str]) -> list[_Start]:
             if separator in found and found[separator].agree > 1:
                 continue
             cells = numbers(line, separator)
-            if not cells or _counts(cells):
+            if not cells or _counts(cells, lines[index + 1 : index + 2], separator):
                 continue
             following = [one for one in lines[index : index + 2 * _COMPARED] if without_comment(one).strip()]
             agree = _agreeing(cells, [numbers(one, separator) for one in following[:_COMPARED]])
@@ -154,9 +166,18 @@ def _are_alike(are_times: Sequence[bool], cells: Sequence[str], row: Sequence[st
     )
 
 
-def _counts(cells: list[str]) -> bool:
-    """Return whether cells are the numbers of columns, as written above them where nothing has a name."""
-    return len(cells) > 1 and cells == ["", *map(str, range(len(cells) - 1))]
+def _counts(cells: list[str], below: Sequence[str], separator: Separator) -> bool:
+    """Return whether cells are the numbers of columns, as written above them where nothing has a name.
+
+    Without an empty cell before them the numbers below must be fractions: whole ones may be samples themselves.
+    """
+    columns = len(cells)
+    if columns > 1 and cells == ["", *map(str, range(columns - 1))]:
+        return True
+    if columns < _FEWEST_COUNTED or cells not in ([str(first + one) for one in range(columns)] for first in (0, 1)):
+        return False
+    rows = [split(line, separator) for line in below]
+    return all(len(row) == columns and all(_FRACTION.search(cell) for cell in row) for row in rows) and bool(rows)
 
 
 def _numbers(line: str, separator: Separator) -> list[str]:
@@ -274,5 +295,7 @@ def _kind(cells: Sequence[str]) -> Kind:
             kinds.append("time" if instant(cell) else "words")
     if not kinds:
         return "nothing"
+    if "words" in kinds and len(kinds) <= _NOTES and len(cells) > _FEW:
+        return "words"
     # One odd cell among numbers is an error of that line.
     return "words" if all(kind == "words" for kind in kinds) else next(kind for kind in kinds if kind != "words")

@@ -82,6 +82,9 @@ class Line:
             _WHOLE_BRACKETS.findall(self._text),
             _WITH_BRACKETS.findall(self._text),
         ):
+            if self._text and most == 1 and len(words) > 1:
+                # Above a single column words are one name, if it has a unit: others may be a title.
+                return [self._text.strip("\"'")] if unit_of(named_unit(self._text)[1]) else []
             if self._text and len(words) > 1 and least <= len(words) <= most:
                 return [word.strip().strip("\"'") for word in words]
         return []
@@ -239,6 +242,12 @@ class Names:
         if all(number(cell, comma=comma) is not None for cell in nearest.cells):
             raise FileError(
                 f"every line must have {self.most} cells; line {nearest.place} has {words}; repair it, or begin it with #"
+            )
+        if self.separator == "," and words < self.most <= 2 * words:
+            raise FileError(
+                f"the line above the numbers must name every column; line {nearest.place} has {words}, and there are {self.most}; {CURE}: "
+                "where a comma is the decimal sign and separates cells, too, nobody can tell which is which; or write semicolons or tabs "
+                "between cells, or numbers in quotes"
             )
         if self.separator == ",":
             raise FileError(

@@ -296,6 +296,12 @@ def _columns(dialect: Dialect, parts: list[Numbers], rows: Rows, say: Say) -> Ch
         while width > 1 and np.isnan(columns[width - 1]).all():
             width -= 1
     names = list(dialect.names)
+    # Separators before or between others make columns without a name that hold nothing.
+    hollow = {
+        column
+        for column in range(width)
+        if dialect.named and names[column] == str(column) and np.isnan(columns[column]).all()
+    }
     for column, times in rows.times.items():
         columns[column], turns = times.unwrapped(columns[column])
         since = f"since {times.first}" if times.is_dated else "of a clock"
@@ -303,4 +309,4 @@ def _columns(dialect: Dialect, parts: list[Numbers], rows: Rows, say: Say) -> Ch
         again = f", which began again {often} and goes on here" if turns else ""
         say(f"column '{printable(names[column], 40)}' holds times: read as seconds {since}{again}")
         names[column] = with_unit(named_unit(names[column])[0], "s")
-    return {names[column]: columns[column] for column in range(width) if column not in rows.dropped}
+    return {names[column]: columns[column] for column in range(width) if column not in rows.dropped | hollow}

@@ -1,0 +1,89 @@
+"""Names above columns in odd places: above one column alone, beside empty columns, numbers of columns, a comma for two things."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tvident
+from tvident import recordings
+
+
+def written(folder: Path, text: str) -> Path:
+    """Write a text as a recorder does."""
+    path = folder / "record.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("line", "name", "unit"),
+    [
+        ("angle [deg]", "angle", "deg"),
+        ("Crank angle (deg)", "Crank angle", "deg"),
+        ('"Drehmoment [N m]"', "Drehmoment", "N m"),
+        ("Torque N m", "Torque", "N m"),
+    ],
+)
+def test_words_above_a_single_column_are_its_name(tmp_path: Path, line: str, name: str, unit: str) -> None:
+    """The name was lost where it has a blank, and with it the unit."""
+    path = written(tmp_path, f"{line}\n1.5\n2.5\n3.5\n")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        recording = tvident.read_recording(path)
+    assert list(recording) == [name]
+    assert recording[name].unit == unit
+    np.testing.assert_array_equal(recording[name], [1.5, 2.5, 3.5])
+
+
+def test_a_title_above_a_single_column_is_no_name(tmp_path: Path) -> None:
+    path = written(tmp_path, "recorded on Monday\n1.5\n2.5\n")
+    with pytest.warns(recordings.FileWarning, match="line 1 is not read as names"):
+        assert list(recordings.read(path)) == ["0"]
+
+
+@pytest.mark.parametrize("before", ["\t", "\t\t"])
+def test_columns_without_a_name_that_hold_nothing_are_none(tmp_path: Path, before: str) -> None:
+    """They were channels called 0, 1 and 3 without a number."""
+    rows = ["t [s]\t\ta", "0.1\t\t2", "0.2\t\t3"]
+    path = written(tmp_path, "".join(f"{before}{row}\n" for row in rows))
+    assert list(recordings.read(path)) == ["t [s]", "a"]
+    path = written(tmp_path, "t [s]\t\ta\n0.1\t7\t2\n0.2\t\t3\n")
+    assert list(recordings.read(path)) == ["t [s]", "1", "a"]
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_numbers_of_columns_are_no_sample(tmp_path: Path, first: int) -> None:
+    """They were the first sample of every channel."""
+    numbers = [str(first + one) for one in range(3)]
+    path = written(tmp_path, ",".join(numbers) + "\n0.5,1.5,2.5\n0.6,1.6,2.6\n")
+    with pytest.warns(recordings.FileWarning, match="line 1 is read as names of columns"):
+        channels = recordings.read(path)
+    assert list(channels) == numbers
+    assert [values.size for values in channels.values()] == [2, 2, 2]
+    # Whole numbers below may as well go on with these.
+    path = written(tmp_path, ";".join(numbers) + "\n3;4;5\n6;7;8\n")
+    assert next(iter(recordings.read(path).values())).size == 3
+
+
+@pytest.mark.parametrize("text", ["t,a,b\n0,1,1,5,2,5\n0,2,1,6,2,6\n", "t,a\n1,2,5\n2,2,6\n", "a\n1,5\n2,5\n"])
+def test_a_comma_for_two_things_is_asked_for(tmp_path: Path, text: str) -> None:
+    """It said that a name was missing for every other column."""
+    with pytest.raises(recordings.FileError, match="where a comma is the decimal sign and separates cells, too"):
+        recordings.read(written(tmp_path, text))
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_notes_beside_a_table_cost_no_row_and_no_name(tmp_path: Path, separator: str) -> None:
+    """Blanks were taken for what separates cells, since empty cells are none then: names, units and two samples were lost."""
+    rows = [["t [s]", "angle [deg]", "", "mean"]]
+    notes = ["0.12", "std", "0.3"]
+    rows += [[f"{place / 10}", f"{place / 4}", "", notes[place] if place < len(notes) else ""] for place in range(30)]
+    path = written(tmp_path, "".join(separator.join(row) + "\n" for row in rows))
+    with pytest.warns(recordings.FileWarning, match="column 'mean': not read, it holds words"):
+        channels = recordings.read(path)
+    assert list(channels) == ["t [s]", "angle [deg]"]
+    np.testing.assert_array_equal(channels["angle [deg]"], np.arange(30) / 4)
