@@ -318,3 +318,34 @@ def test_times_of_any_unit_and_with_jitter_are_held_against_a_rate(
     said = run("identify", "other.csv", "--angle", "angle", "--torque", "torque", *given).stderr
     assert told in said
     assert ("Warning" in said) == bool(told)
+
+
+@pytest.mark.parametrize(
+    ("line", "typed"),
+    [
+        ('term = "coulomb"', ["--term", "coulomb"]),
+        ('term = ["offset", "coulomb:windowed"]', ["--term", "offset", "--term", "coulomb:windowed"]),
+        ("missing = -9999", ["--missing", "-9999"]),
+        ("missing = [-9999, 1e20]", ["--missing", "-9999", "--missing", "1e20"]),
+    ],
+)
+def test_an_option_that_may_be_repeated_is_a_list_or_one_value(folder: Path, line: str, typed: list[str]) -> None:
+    (folder / "several.toml").write_text(line + "\n")
+    from_file, by_hand = (run(*IDENTIFY, *more) for more in (["--settings", "several.toml"], typed))
+    assert from_file.returncode == 0, from_file.stderr
+    assert from_file.stdout == by_hand.stdout
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("s.json", '{"a": 1,\n}', "it is no JSON from line 2, column 1 on"),
+        ("s.toml", "order = \n", "it is no TOML from line 1, column 9 on"),
+    ],
+)
+def test_a_settings_file_that_is_broken_says_where(folder: Path, name: str, content: str, words: str) -> None:
+    """The words of Python's parsers stood there."""
+    (folder / name).write_text(content)
+    done = run(*IDENTIFY, "--settings", name)
+    assert done.returncode in {1, 2}
+    assert words in " ".join(done.stderr.split())

@@ -369,7 +369,7 @@ def test_names_of_channels_are_no_names_of_files_and_no_formulas(folder: Path) -
     ("content", "message"),
     [
         ("{}", "settings must be those of an earlier result"),
-        ("[" * 100_000, "holds no settings (maximum recursion"),
+        ("[" * 100_000, "holds no settings: brackets are nested too deeply"),
         ("\0", "holds no settings"),
         (
             '{"kinds": {}, "known": {}, "terms": [], "lag": 0, "quantisation": 0, "form": []}',

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import stat
 import tomllib
 from pathlib import Path
@@ -44,12 +45,22 @@ def read_settings(path: str) -> dict[str, Any]:
         is_toml = ending == ".toml" and not text.lstrip().startswith("{")
         content = tomllib.loads(text) if is_toml else json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise recordings.FileError(f"{place}: holds no settings ({error}); {cure}") from None
+        raise recordings.FileError(f"{place}: holds no settings{_where(error)}; {cure}") from None
     if not isinstance(content, dict):
         raise recordings.FileError(f"{place}: holds no settings; {cure}")
     if content.keys() == {"table", "sha256", "settings"}:
         return settings_beside(Path(path))
     return content
+
+
+def _where(error: Exception) -> str:
+    """Return where a text stops to be JSON or TOML, as far as an error says so."""
+    if isinstance(error, json.JSONDecodeError):
+        return f": it is no JSON from line {error.lineno}, column {error.colno} on"
+    if isinstance(error, RecursionError):
+        return ": brackets are nested too deeply"
+    found = re.search(r"at line (\d+), column (\d+)", str(error))
+    return f": it is no TOML from line {found[1]}, column {found[2]} on" if found else ""
 
 
 def _begins_as_json(path: str) -> bool:
@@ -76,9 +87,13 @@ def options_from_toml(ctx: click.Context, path: str) -> str | None:
 
 
 def _as_typed(option: click.Parameter, value: Any) -> Any:
-    """Return a value as it would be typed, where the option takes text."""
+    """Return a value as it would be typed, where the option takes text; one value of an option that may be repeated is a list of one."""
     if option.multiple and not isinstance(value, list):
         value = [value]
     if isinstance(value, list):
-        return [_as_typed(option, one) for one in value]
-    return str(value) if option.type is click.STRING and not isinstance(value, bool) else value
+        return [_text(option, one) for one in value]
+    return _text(option, value)
+
+
+def _text(option: click.Parameter, value: Any) -> Any:
+    return str(value) if option.type is click.STRING and not isinstance(value, bool | list) else value
