@@ -95,6 +95,8 @@ def compare(
     give(result.table, {"residual_std": units["residual_std"]}, words, output)
     if plot is not None:
         save_figure(result.plot(), Path(plot))
+    if not np.any(result.table["weight"]):
+        click.get_current_context().exit(1)
 
 
 def _content(result: tvident.ModelComparison, units: Mapping[str, str]) -> dict[str, Any]:
@@ -107,7 +109,7 @@ def _content(result: tvident.ModelComparison, units: Mapping[str, str]) -> dict[
         }
     return {
         "verdict": in_options(result.summary().splitlines()[-1]),
-        "best": result.best,
+        "best": result.best if np.any(result.table["weight"]) else None,
         "observations": result.observations,
         "models": _rows(result.table),
         "averaged": averaged,

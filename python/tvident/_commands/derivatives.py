@@ -11,7 +11,16 @@ import numpy.typing as npt
 import tvident
 from tvident._commands.channels import channel_of, channels_in, check_has_times, only_channel
 from tvident._commands.given import check_time, given, length, period_of, wanted_progress
-from tvident._commands.output import PICTURE, RECORDING, RESULTS, check_outputs, figures_on_file, give, save_figure
+from tvident._commands.output import (
+    PICTURE,
+    RECORDING,
+    RESULTS,
+    check_outputs,
+    end_without_result,
+    figures_on_file,
+    give,
+    save_figure,
+)
 from tvident._commands.rates import say_other_rate
 from tvident._status import describe
 from tvident._units import derivative_units, named_unit, times_in_seconds, unit_said
@@ -79,3 +88,4 @@ def derivatives(
         name = named_unit(channel)[0]
         drawn = figures_on_file().plot_derivatives(fit.time, fit, name, samples=raw if is_raw else None, unit=unit)
         save_figure(drawn, Path(plot))
+    end_without_result(fit.status)

@@ -139,9 +139,11 @@ def _align_of(text: str | None) -> Literal["offset", "drift"] | float | None:
         return "offset"
     if text == "drift":
         return "drift"
-    found = lag_of(text)
+    wrong = click.UsageError(f"align must be offset, drift, seconds or a time such as '2 ms'; got {text!r}; repair it")
+    try:
+        found = lag_of(text)
+    except click.UsageError:
+        raise wrong from None
     if isinstance(found, str):
-        raise click.UsageError(
-            f"align must be offset, drift, seconds or a time such as '2 ms'; got {text!r}; repair it"
-        )
+        raise wrong
     return found

@@ -7,14 +7,22 @@ import math
 from pathlib import Path
 from typing import Any
 
-import click
 import numpy as np
 
 from tvident._commands.channels import channels_in
 from tvident._commands.identification import identified, inputs
 from tvident._commands.in_pieces import identify_in_pieces
 from tvident._commands.named import named, with_velocity
-from tvident._commands.output import PICTURE, RESULTS, SETTINGS, check_outputs, give, save_figure, say
+from tvident._commands.output import (
+    PICTURE,
+    RESULTS,
+    SETTINGS,
+    check_outputs,
+    end_without_result,
+    give,
+    save_figure,
+    say,
+)
 from tvident._commands.words import in_options
 from tvident._files import check_beside, keeps_result, place_beside, replaced
 from tvident._results import explained_steps
@@ -62,8 +70,7 @@ def identify(
         say(words)
     if plot is not None:
         save_figure(result.plot(), Path(plot))
-    if not np.isfinite(result.inertia).any():
-        click.get_current_context().exit(1)
+    end_without_result(result.status)
 
 
 def _plain(result: Any) -> dict[str, Any]:

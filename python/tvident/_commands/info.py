@@ -15,6 +15,9 @@ from tvident._commands.channels import channels_in, stated_in
 from tvident._files import aligned, increasing_times, printable, time_channels
 from tvident._units import ROTARY, named_unit, unit_of, unit_said
 
+_SELDOM = 0.5
+"""Steps of a clock that do not go on."""
+
 
 def info(file: str, as_json: bool) -> None:  # noqa: FBT001 - click passes options by name
     """List the channels of FILE: how many samples, their range, and what is missing."""
@@ -69,13 +72,33 @@ def _remark(name: str, values: npt.NDArray[Any]) -> str:
             if np.abs(values - grid).max() <= 1e-3 * period:
                 return f"uniform: {1 / period:.6g} per unit{_in_hertz(name, period)}"
             return _steps(name, values)
-    return "constant" if steps.size and not steps.any() else ""
+    if steps.size and not steps.any():
+        return "constant"
+    return _turns(name, steps)
+
+
+def _turns(name: str, steps: npt.NDArray[np.float64]) -> str:
+    """Return how often a clock goes back or stands; nothing of what is no clock: times mostly increase."""
+    back, stands = (int(np.count_nonzero(one)) for one in (steps < 0, steps == 0))
+    is_clock = time_channels([name]) or _is_time(name)
+    if not is_clock or not (back or stands) or back + stands > _SELDOM * steps.size:
+        return ""
+    first = int(np.flatnonzero(steps <= 0)[0]) + 1
+    often = "once" if back == 1 else f"{back} times"
+    words = [f"goes back {often}"] if back else []
+    words += [f"stands {'once' if stands == 1 else f'{stands} times'}"] if stands else []
+    return f"{', '.join(words)}, first at sample {first}"
+
+
+def _is_time(name: str) -> bool:
+    unit = unit_of(named_unit(name)[1])
+    return unit is not None and unit.dimension == ROTARY.dimensions["time"]
 
 
 def _in_hertz(name: str, period: float) -> str:
     """Return the sample rate of a channel whose unit is one of time."""
     unit = unit_of(named_unit(name)[1])
-    if unit is None or unit.dimension != ROTARY.dimensions["time"]:
+    if unit is None or not _is_time(name):
         return ""
     return f", {1 / (period * unit.factor):.6g} Hz"
 

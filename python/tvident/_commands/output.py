@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 import numpy.typing as npt
 
 from tvident._commands.words import in_options
 from tvident._files import check_apart, check_folder, check_place, printable, replaced, write_csv, write_table
+from tvident._status import Status
 
 RESULTS, PICTURE, SETTINGS, RECORDING = "results", "the picture", "the settings of this run", "the recording"
 REPORT = "the report"
@@ -67,3 +69,9 @@ def check_outputs(outputs: Mapping[str, str | None], inputs: Mapping[str, str | 
             check_folder(Path(place))
     files = {name: path for name, path in outputs.items() if (name, path) != (RESULTS, "-")}
     check_apart(files, inputs)
+
+
+def end_without_result(status: npt.NDArray[Any]) -> None:
+    """End with 1 where no sample has a value: what was written holds nothing that can be used."""
+    if not status.size or (np.asarray(status) & Status.INVALID != 0).all():
+        click.get_current_context().exit(1)

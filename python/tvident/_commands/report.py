@@ -13,7 +13,7 @@ from tvident import _report, recordings
 from tvident._commands.channels import channels_in, source_of
 from tvident._commands.identification import identified, inputs
 from tvident._commands.named import named, with_velocity
-from tvident._commands.output import REPORT, RESULTS, check_outputs, say
+from tvident._commands.output import REPORT, RESULTS, check_outputs, end_without_result, say
 from tvident._commands.words import in_options
 from tvident._files import full_name, printable
 
@@ -49,6 +49,7 @@ def report(file: str | None, output: str, **options: Any) -> None:
     say(result.summary(), err=output == "-")
     if output != "-":
         click.echo(f"\nWritten: {printable(output)}")
+    end_without_result(result.status)
 
 
 def _is_in(channels: recordings.Channels, name: str | None) -> bool:

@@ -289,6 +289,10 @@ class FileRecording(Mapping[str, Channel]):
         }
 
 
+_DAYS = 2e-7
+"""A sample period in seconds up to which it may be in days: 60 Hz or more."""
+
+
 def _rate_of(name: str, value: Channel) -> float | None:
     """Return the samples per second that a single number says, None where it is called otherwise or cannot be one."""
     bare, number = name.rpartition(".")[2], float(value.reshape(-1)[0])
@@ -310,6 +314,12 @@ def _check_no_counts(time: npt.NDArray[np.float64]) -> None:
                 f"the first, {time[0]:.5g}, would be of the year {time[0] / _YEAR + 1970:.0f} if it were seconds; call the channel "
                 f"'time [{unit}]', or give t= and time_unit='{unit}', if it counts {word} since 1970"
             )
+    step = float(time[-1] - time[0]) / (time.size - 1)
+    if 0 < step <= _DAYS:
+        raise ValueError(
+            f"one sample in {step:.4g} s would be {1 / step:.4g} Hz; call the channel 'time [days]', or give t= and time_unit='days', if "
+            "it counts days, as datenum of MATLAB and spreadsheets do"
+        )
 
 
 def read_recording(path: str | Path, *, missing: float | Sequence[float] = ()) -> FileRecording:
