@@ -262,3 +262,11 @@ def test_a_result_with_functions_of_ones_own_can_be_stored() -> None:
     found = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, terms=["offset", term])
     assert len(pickle.dumps(found)) < 2 * sum(values.nbytes for values in found.columns().values())
     assert pickle.loads(pickle.dumps(found)).advice == found.advice  # noqa: S301 - our own
+
+
+def test_an_angle_that_wraps_at_a_turn_is_in_rad() -> None:
+    """It was asked for its unit again where the unwrapped angle moved through two turns."""
+    angle, torque = 100 * RIG.angle, 100 * RIG.torque
+    assert "degrees?" in advice(angle, torque)
+    wrapped = np.angle(np.exp(1j * angle))
+    assert "degrees?" not in advice(wrapped, torque, period=2 * np.pi)

@@ -16,6 +16,9 @@ from tvident._units import ROTARY, Axis
 _ONE_TURN = 2 * math.pi
 """An angle in rad that moves by more, to both sides, may be in degrees."""
 
+_TURNS = 1e-3
+"""By how much a period of a turn or half of one in rad may be rounded."""
+
 _SLOW = 0.09
 """A sample period in seconds from which on it may be in milliseconds: a step of 0.1 ms, at 10 kHz, looks like 0.1 s, and hardly a vibration
 is sampled so slowly."""
@@ -48,11 +51,14 @@ class Plausible:
         Seconds from one sample to the next.
     names : sequence of str
         Unknowns.
+    turn : float, optional
+        Period of a wrapped angle, as it is used.
     """
 
     axis: Axis
     period: float
     names: Sequence[str]
+    turn: float | None = None
 
     @np.errstate(all="ignore")
     def before(self, words: Words, angles: npt.NDArray[np.number], found: Estimates) -> Words:
@@ -70,6 +76,8 @@ class Plausible:
     def _far(self, angle: npt.NDArray[np.number]) -> list[str]:
         if "angle" not in self.axis.assumed or self.axis.system is not ROTARY:
             return []
+        if self.turn is not None and any(abs(self.turn - one) < _TURNS for one in (math.pi, _ONE_TURN)):
+            return []  # whoever says that it wraps at a turn in rad knows its unit
         if mark_in(angle / self.axis.angle) is not None:
             return []  # which is asked for already
         is_finite = np.isfinite(angle)

@@ -75,7 +75,7 @@ class Told:
             Of the result.
         """
         data, several = self.data, bool(self.data.batch)
-        plausible = Plausible(data.axis, data.period, [one.name for one in self.unknowns])
+        plausible = Plausible(data.axis, data.period, [one.name for one in self.unknowns], self.request.period)
         more = [words_of_search(terms) for terms in searched]
         if isinstance(self.request.form, StrongForm) and data.instruments is None:
             words = self._of_strong_form(settings).words()
