@@ -26,6 +26,7 @@ def written(folder: Path, text: str) -> Path:
         ("Crank angle (deg)", "Crank angle", "deg"),
         ('"Drehmoment [N m]"', "Drehmoment", "N m"),
         ("Torque N m", "Torque", "N m"),
+        ("level [tics]", "level", "tics"),
     ],
 )
 def test_words_above_a_single_column_are_its_name(tmp_path: Path, line: str, name: str, unit: str) -> None:
@@ -41,6 +42,10 @@ def test_words_above_a_single_column_are_its_name(tmp_path: Path, line: str, nam
 
 def test_a_title_above_a_single_column_is_no_name(tmp_path: Path) -> None:
     path = written(tmp_path, "recorded on Monday\n1.5\n2.5\n")
+    for title in ("recorded on Monday", "a test of the rig (second one)"):
+        path.write_text(f"{title}\n1.5\n2.5\n")
+        with pytest.warns(recordings.FileWarning, match="line 1 is not read as names"):
+            assert list(recordings.read(path)) == ["0"]
     with pytest.warns(recordings.FileWarning, match="line 1 is not read as names"):
         assert list(recordings.read(path)) == ["0"]
 
@@ -87,3 +92,14 @@ def test_notes_beside_a_table_cost_no_row_and_no_name(tmp_path: Path, separator:
         channels = recordings.read(path)
     assert list(channels) == ["t [s]", "angle [deg]"]
     np.testing.assert_array_equal(channels["angle [deg]"], np.arange(30) / 4)
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+@pytest.mark.parametrize("odd", ["2.5", "inf", "OVLD", "#DIV/0!"])
+def test_a_row_of_separators_is_a_row(tmp_path: Path, separator: str, odd: str) -> None:
+    """Where another cell was odd, so that rows were read one by one, a row of tabs was left out and all after it came earlier."""
+    rows = [["a", "b"], ["0.5", "1.5"], ["", ""], ["1.5", odd], ["2.5", "3.5"]]
+    path = written(tmp_path, "".join(separator.join(row) + "\n" for row in rows))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", recordings.FileWarning)
+        np.testing.assert_array_equal(recordings.read(path)["a"], [0.5, np.nan, 1.5, 2.5])

@@ -344,3 +344,16 @@ def test_a_sheet_keeps_every_bit(tmp_path: Path) -> None:
     numbers[3] = np.nan
     tvident.FileRecording({"n": np.arange(2000), "x [N m]": numbers}).write(tmp_path / "x.xlsx")
     np.testing.assert_array_equal(tvident.read_recording(tmp_path / "x.xlsx")["x"], numbers)
+
+
+@pytest.mark.parametrize("columns", [1, 2])
+def test_a_sheet_keeps_what_is_no_number(tmp_path: Path, columns: int) -> None:
+    """Infinite values came back as missing, and a sheet of one column that lacks a value was refused."""
+    pytest.importorskip("openpyxl")
+    values = np.array([1.5, np.nan, np.inf, -np.inf, 2.5])
+    names = ["a [rad]", "b"][:columns]
+    tvident.FileRecording(dict.fromkeys(names, values)).write(tmp_path / "x.xlsx")
+    back = recordings.read(tmp_path / "x.xlsx")
+    assert list(back) == names
+    for one in back.values():
+        np.testing.assert_array_equal(one, values)

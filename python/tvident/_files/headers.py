@@ -43,6 +43,9 @@ _STATED = re.compile(r"[:=]")
 _MOSTLY = 0.5
 """Part of a line's cells that are units which are known, where the others are units, too."""
 
+_FEW_WORDS = 3
+"""With a unit that is not known, of a name above a single column."""
+
 _APART = re.compile(r"\t|\s{2,}")
 _WHOLE_BRACKETS = re.compile(r'"[^"]*"|(?:\[[^\]]*\]|\([^)]*\)|[^\s"])+')
 _WITH_BRACKETS = re.compile(r'(?:"[^"]*"|[^\s"]+)(?:\s(?:\[[^\]]*\]|\([^)]*\)))?')
@@ -84,7 +87,9 @@ class Line:
         ):
             if self._text and most == 1 and len(words) > 1:
                 # Above a single column words are one name, if it has a unit: others may be a title.
-                return [self._text.strip("\"'")] if unit_of(named_unit(self._text)[1]) else []
+                unit = named_unit(self._text)[1]
+                is_name = unit and (unit_of(unit) is not None or len(self.cells) <= _FEW_WORDS)
+                return [self._text.strip("\"'")] if is_name else []
             if self._text and len(words) > 1 and least <= len(words) <= most:
                 return [word.strip().strip("\"'") for word in words]
         return []

@@ -248,7 +248,8 @@ class Rows:
         rows = []
         for place, whole in enumerate(lines, self._line + 1):
             line = without_comment(whole)
-            if not line.strip() or self._is_remark(line):
+            # A line of tabs is a row in which nothing was measured, as a line of commas is.
+            if not (line.strip(" \r\n") if self._dialect.separator == "\t" else line.strip()) or self._is_remark(line):
                 if self._width == 1 and place < self._line + len(lines) and not whole.lstrip().startswith("#"):
                     self._blank = place
                 continue

@@ -113,7 +113,7 @@ def _variables(names: list[str]) -> dict[str, str]:
 
 
 def write_xlsx(file: IO[bytes], columns: Columns, units: Mapping[str, str]) -> None:
-    """Write a sheet: names, units, then a row for every sample; a cell without a number is empty."""
+    """Write a sheet: names, units, then a row for every sample; a cell without a number is empty, of an infinite one says so."""
     from openpyxl import Workbook  # noqa: PLC0415 - an extra
     from openpyxl.cell import WriteOnlyCell  # noqa: PLC0415 - likewise
 
@@ -128,8 +128,11 @@ def write_xlsx(file: IO[bytes], columns: Columns, units: Mapping[str, str]) -> N
 
     def number(value: float) -> Any:
         """Return what becomes the number, None where it is none: openpyxl itself writes 16 digits, and some doubles have 17."""
-        if not math.isfinite(value):
-            return None
+        if math.isnan(value):
+            # In a sheet of one column an empty cell would be an empty line.
+            return None if len(columns) > 1 else words("nan")
+        if math.isinf(value):
+            return words(repr(value))
         if float(f"{value:.16g}") == value:
             return value
         cell = WriteOnlyCell(sheet, repr(value))
