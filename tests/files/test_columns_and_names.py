@@ -103,3 +103,21 @@ def test_a_row_of_separators_is_a_row(tmp_path: Path, separator: str, odd: str) 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", recordings.FileWarning)
         np.testing.assert_array_equal(recordings.read(path)["a"], [0.5, np.nan, 1.5, 2.5])
+
+
+@pytest.mark.parametrize(
+    "name", ["unix_time", "Elapsed Time", "Running time", "rel. time", "Messzeit", "time_unix", "abs time"]
+)
+def test_a_clock_may_say_whose_it_is(name: str) -> None:
+    clock = 1.7e9 + np.arange(200) / 50
+    recording = tvident.FileRecording({name: clock, "a": np.sin(clock)})
+    assert recording.sample_rate == pytest.approx(50)
+    both = tvident.FileRecording({name: clock, "time": np.arange(200) / 50, "a": np.sin(clock)})
+    assert both.time is not None
+    assert both.time[0] == 0
+
+
+@pytest.mark.parametrize("name", ["rise time", "time constant", "lifetime", "dead_time", "sometimes"])
+def test_other_times_are_no_clocks(name: str) -> None:
+    with pytest.raises(ValueError, match="needs a channel of times"):
+        _ = tvident.FileRecording({name: np.arange(200) / 50, "a": np.ones(200)}).sample_rate

@@ -211,6 +211,8 @@ class FileRecording(Mapping[str, Channel]):
         found = [name for name, values in long.items() if arguments.is_time(name, values.unit)]
         # Structures and groups put their names before those of their channels.
         grouped = [name for name, values in long.items() if arguments.is_time(name.rpartition(".")[2], values.unit)]
+        # A clock that is called more closely, as that of the system, may have begun long before.
+        found.sort(key=len)
         called = found[:1] or (grouped if len(grouped) == 1 else increasing_times(long))
         # Groups that were sampled together have one clock.
         called = called[:1] if all(np.array_equal(long[called[0]], long[name]) for name in called[1:]) else called
