@@ -280,6 +280,14 @@ def test_a_current_is_told_what_makes_a_torque_of_it(text: str) -> None:
 
 
 @pytest.mark.parametrize(
+    "text", ["Degree(s)", "[Degree(s)]", "(deg)", "((deg))", "< deg >", "Nm/(rad/s)", "(Nm", "N(m)", "[]", "(-)"]
+)
+def test_brackets_around_a_unit_are_none_of_it(text: str) -> None:
+    """Of ``Degree(s)`` in a line of units the last one was taken off."""
+    assert is_unit(text)
+
+
+@pytest.mark.parametrize(
     ("quantity", "text", "cure"),
     [
         ("time", "MS", "time_unit='ms'"),

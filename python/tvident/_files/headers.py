@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from tvident._files.cells import Separator, are_joined, is_present, is_remark, number, split, without_comment
 from tvident._files.channels import FileError, Say
 from tvident._files.names import listed, printable
-from tvident._units import is_unit, named_unit, unit_of, with_unit
+from tvident._units import is_unit, named_unit, unit_of, with_unit, without_brackets
 
 CURE = "export the channels as columns of numbers with a point as the decimal sign"
 
@@ -347,7 +347,7 @@ def _are_units(cells: Sequence[str]) -> bool:
 
 def _with_unit(name: str, unit: str) -> str:
     """Return a name with the unit of another line, unless it has one itself."""
-    bare = unit.strip("[](){}<>").strip()
+    bare = without_brackets(unit)
     return name if named_unit(name)[1] else with_unit(name, bare)
 
 

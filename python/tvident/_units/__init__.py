@@ -3,7 +3,7 @@
 from tvident._units.axis import Axis, axis_of, factor_said, scaled, times_in_seconds
 from tvident._units.channel import Channel, has_unit_in_attributes, in_its_unit, unit_named, unit_said
 from tvident._units.names import derivative_units, named_unit, with_unit
-from tvident._units.parse import Unit, is_unit, unit_of
+from tvident._units.parse import Unit, is_unit, unit_of, without_brackets
 from tvident._units.quantities import (
     LINEAR,
     ROTARY,
@@ -45,4 +45,5 @@ __all__ = [
     "unit_of",
     "unit_said",
     "with_unit",
+    "without_brackets",
 ]

@@ -33,6 +33,7 @@ _POWER = re.compile(r"\s*\^\s*")
 _ONE_OVER = re.compile(r"1\s*/\s*")
 _BETWEEN = re.compile(r"\s*([/.]|-(?=[A-Za-z]))?\s*")
 
+_BRACKETS = {"[": "]", "(": ")", "{": "}", "<": ">"}
 _NO_UNIT = frozenset(("", "-", "--", "1", "none", "n/a", "a.u.", "[]", "()"))
 
 
@@ -46,8 +47,17 @@ class Unit:
 
 def is_unit(text: str) -> bool:
     """Return whether a cell of a header can be a unit, or says that there is none."""
-    bare = text.strip().strip("[](){}<>").strip()
+    bare = without_brackets(text)
     return bare.lower() in _NO_UNIT or bare in DOUBTFUL or unit_of(bare) is not None
+
+
+def without_brackets(text: str) -> str:
+    """Return a unit without brackets around it; those within stay: Degree(s), Nm/(rad/s)."""
+    bare = text.strip()
+    while bare[:1] in _BRACKETS and bare.endswith(_BRACKETS[bare[:1]]):
+        bare = bare[1:-1].strip()
+    # What is open at one end is a bracket that nobody closed.
+    return bare.strip("[](){}<>").strip() if bare.count("(") != bare.count(")") else bare.strip("[]{}<>").strip()
 
 
 @lru_cache(maxsize=256)
