@@ -109,3 +109,14 @@ def test_another_quantity_is_refused(given: dict[str, Any], words: str) -> None:
 def test_a_period_that_knows_its_unit_needs_no_other() -> None:
     with pytest.raises(TypeError, match=r"delta says its unit itself; .*leave time_unit out"):
         inertia(delta=1 * UNIT.ms, time_unit="ms")
+
+
+class Words:
+    """A quantity that is no number."""
+
+    units, magnitude = "kHz", "fast"
+
+
+def test_words_with_a_unit_are_no_number() -> None:
+    with pytest.raises(TypeError, match="sample_rate must be a number"):
+        inertia(sample_rate=Words())

@@ -46,7 +46,10 @@ def measured(name: str, value: Any) -> float | None:
     if isinstance(value, np.timedelta64):
         return float(value / _SECOND) if wanted == "s" else None
     factor = factor_between(unit_said(value), wanted, name=name)
-    return float(np.asarray(_plain(value), dtype=np.float64).reshape(-1)[0]) * factor
+    try:
+        return float(np.asarray(_plain(value), dtype=np.float64).reshape(-1)[0]) * factor
+    except (TypeError, ValueError):  # of words with a unit
+        return None
 
 
 def _plain(value: Any) -> Any:
