@@ -121,3 +121,22 @@ def test_a_clock_may_say_whose_it_is(name: str) -> None:
 def test_other_times_are_no_clocks(name: str) -> None:
     with pytest.raises(ValueError, match="needs a channel of times"):
         _ = tvident.FileRecording({name: np.arange(200) / 50, "a": np.ones(200)}).sample_rate
+
+
+@pytest.mark.parametrize("padded", [True, False])
+@pytest.mark.parametrize("day", ["", "2024-05-06 "])
+def test_milliseconds_behind_a_colon_are_counted(tmp_path: Path, padded: bool, day: str) -> None:
+    """Without zeros before them 5 and 50 ms were both half a second."""
+    counts = range(0, 3000, 5)
+    cells = [f"{day}12:30:{15 + one // 1000}:{one % 1000:{'03d' if padded else 'd'}}" for one in counts]
+    path = written(tmp_path, "time,a\n" + "".join(f"{cell},{place}.5\n" for place, cell in enumerate(cells)))
+    with pytest.warns(recordings.FileWarning, match="holds times: read as seconds"):
+        time = recordings.read(path)["time [s]"]
+    np.testing.assert_allclose(time - time[0], np.arange(0, 3, 0.005), atol=1e-9)
+
+
+def test_two_digits_behind_a_third_colon_may_be_frames(tmp_path: Path) -> None:
+    cells = [f"00:00:{one // 50:02d}:{one % 50:02d}" for one in range(200)]
+    path = written(tmp_path, "time,a\n" + "".join(f"{cell},{place}.5\n" for place, cell in enumerate(cells)))
+    with pytest.raises(recordings.FileError, match="may be hundredths of a second or frames"):
+        recordings.read(path)

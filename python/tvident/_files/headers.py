@@ -366,3 +366,11 @@ def not_a_time(place: int, name: str, cell: str) -> str:
         f"line {place} must hold a time in column '{printable(name, 40)}', as the lines above; it has '{printable(cell, 40)}'; write "
         f"12:30:00.5 or 2024-12-31T12:30:00.5"
     )
+
+
+def may_be_frames(name: str, first: str) -> str:
+    """Return the message about times that end in a third colon and two digits."""
+    return (
+        f"what stands behind a third colon must be milliseconds; in column '{printable(name, 40)}' it has two digits throughout, as in "
+        f"'{printable(first, 40)}', and may be hundredths of a second or frames; write 12:30:00.05"
+    )

@@ -25,7 +25,7 @@ from tvident._files.cells import (
 from tvident._files.channels import FileError, Say
 from tvident._files.cut import what_lacks
 from tvident._files.dialect import Dialect
-from tvident._files.headers import CURE, not_a_number, not_a_time
+from tvident._files.headers import CURE, may_be_frames, not_a_number, not_a_time
 from tvident._files.names import printable
 from tvident._files.no_values import Unmeasured
 from tvident._files.times import TimeColumn, instant
@@ -162,6 +162,8 @@ class Rows:
         else:
             self._check_thousands()
         for column, times in self.times.items():
+            if times.may_count_frames:
+                raise FileError(may_be_frames(self._dialect.names[column], times.first))
             if times.is_doubtful:
                 raise FileError(
                     f"dates must say what is the day and what the month; those of column '{printable(self._dialect.names[column], 40)}' do "

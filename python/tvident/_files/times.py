@@ -11,9 +11,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-_CLOCK = (
-    r"(?:T|\s+)?(?P<h>\d{1,3}):(?P<m>[0-5]\d):(?P<s>[0-5]\d)(?:[.,:](?P<f>\d{1,12}))?\s*(?:(?P<half>[AaPp])\.?[Mm]\.?)?"
-)
+_CLOCK = r"(?:T|\s+)?(?P<h>\d{1,3}):(?P<m>[0-5]\d):(?P<s>[0-5]\d)(?:(?P<sep>[.,:])(?P<f>\d{1,12}))?\s*(?:(?P<half>[AaPp])\.?[Mm]\.?)?"
 _ZONE = r"\s*(?P<zone>Z|UTC|GMT|[+-]\d\d(?::?\d\d)?)?"
 _YEAR_FIRST = r"(?P<y>\d{4})(?P<sign>[-/.])(?P<mo>\d{1,2})(?P=sign)(?P<d>\d{1,2})"
 _COMPACT = r"(?P<y>\d{4})(?P<mo>\d\d)(?P<d>\d\d)T(?P<h>\d\d)(?P<m>[0-5]\d)(?P<s>[0-5]\d)(?:[.,](?P<f>\d{1,12}))?"
@@ -37,6 +35,9 @@ _FORMS = tuple(
 )
 _DAY, _HOUR = 86_400, 3600
 
+_MILLI, _HUNDREDTHS = 3, 2
+"""Digits of milliseconds, and of what may be hundredths of a second or frames."""
+
 
 @dataclass(frozen=True)
 class Instant:
@@ -47,6 +48,8 @@ class Instant:
     is_dated: bool
     wraps: int
     """Seconds after which a clock begins again."""
+    counted: int = 0
+    """Digits behind a third colon, which count parts of a second and are no fraction."""
     doubtful: tuple[int, int] | None = None
     """Day and month of a date that may be read in two ways."""
 
@@ -67,8 +70,10 @@ def instant(cell: str, order: Order = None) -> Instant | None:
 
 
 def _instant(part: dict[str, str | None], order: Order) -> Instant | None:
-    fraction = part.get("f")
-    within = 0 if fraction is None else int(f"{fraction:0<9}"[:9])
+    fraction = part.get("f") or ""
+    # Behind a third colon stand milliseconds, with as many digits as they have; only more than three are a fraction.
+    counted = len(fraction) if part.get("sep") == ":" and len(fraction) <= _MILLI else 0
+    within = int(f"{fraction:0>{_MILLI}}{'0' * 6}" if counted else f"{fraction:0<9}"[:9])
     hours = int(part.get("h") or 0)
     if part.get("half"):
         hours = hours % 12 + (12 if part["half"] in {"p", "P"} else 0)
@@ -77,7 +82,7 @@ def _instant(part: dict[str, str | None], order: Order) -> Instant | None:
         part = {**part, "y": f"20{part['short']}"}
     if part.get("y") is None:
         wraps = _DAY if "h" in part else _HOUR
-        return Instant(10**9 * seconds + within, is_dated=False, wraps=wraps)
+        return Instant(10**9 * seconds + within, is_dated=False, wraps=wraps, counted=counted)
     doubtful = None
     if part.get("a") is not None:
         first, second = int(part["a"] or 0), int(part["b"] or 0)
@@ -97,7 +102,7 @@ def _instant(part: dict[str, str | None], order: Order) -> Instant | None:
     if zone not in {"Z", "UTC", "GMT"}:
         minutes = int(zone[-2:]) if len(zone) > len("+01") else 0
         seconds -= (1 if zone[0] == "+" else -1) * (_HOUR * int(zone[1:3]) + 60 * minutes)
-    return Instant(10**9 * (_DAY * days + seconds) + within, is_dated=True, wraps=0, doubtful=doubtful)
+    return Instant(10**9 * (_DAY * days + seconds) + within, is_dated=True, wraps=0, counted=counted, doubtful=doubtful)
 
 
 class TimeColumn:
@@ -110,6 +115,7 @@ class TimeColumn:
         self._dates: set[tuple[int, int]] = set()
         self._order: Order = None
         self._wraps = 0
+        self._counted: set[int] = set()
         for cell in cells:
             found = _FORMS[2].fullmatch(cell)
             if found and found["sign"] == "/":
@@ -134,6 +140,7 @@ class TimeColumn:
             self._wraps = found.wraps
         if found.is_dated != (self._wraps == 0):
             raise ValueError(cell)
+        self._counted.add(found.counted)
         if found.doubtful:
             self._dates.add(found.doubtful)
         return (found.nanoseconds - self._base) / 1e9
@@ -142,6 +149,11 @@ class TimeColumn:
     def is_doubtful(self) -> bool:
         """Whether dates differ, and what is a day may be a month."""
         return len(self._dates) > 1
+
+    @property
+    def may_count_frames(self) -> bool:
+        """Whether two digits stand behind the third colon of every time."""
+        return self._counted == {_HUNDREDTHS}
 
     @property
     def is_dated(self) -> bool:
