@@ -140,3 +140,13 @@ def test_two_digits_behind_a_third_colon_may_be_frames(tmp_path: Path) -> None:
     path = written(tmp_path, "time,a\n" + "".join(f"{cell},{place}.5\n" for place, cell in enumerate(cells)))
     with pytest.raises(recordings.FileError, match="may be hundredths of a second or frames"):
         recordings.read(path)
+
+
+def test_dates_with_points_for_colons_are_times(tmp_path: Path) -> None:
+    """A text with such a column beside others was said to hold no numbers."""
+    rows = "".join(f"{1000 * one},2024-05-06T16.08.{one:02d}.250,{one}.5\n" for one in range(30))
+    path = written(tmp_path, f"epoch (ms),timestamp (+0200),angle (deg)\n{rows}")
+    with pytest.warns(recordings.FileWarning, match="holds times: read as seconds since"):
+        channels = recordings.read(path)
+    np.testing.assert_array_equal(list(channels.values())[1], np.arange(30.0))
+    np.testing.assert_array_equal(channels["angle (deg)"], np.arange(30) + 0.5)

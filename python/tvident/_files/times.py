@@ -28,6 +28,8 @@ _FORMS = tuple(
         rf"{_YEAR_LAST}(?:{_CLOCK}{_ZONE})?",
         r"(?P<m>\d{1,3}):(?P<s>[0-5]\d)[.,](?P<f>\d{1,12})",
         _COMPACT + _COMPACT_ZONE,
+        # As files are called by sensors, where a colon is not allowed.
+        rf"{_YEAR_FIRST}T(?P<h>\d\d)\.(?P<m>[0-5]\d)\.(?P<s>[0-5]\d)(?:\.(?P<f>\d{{1,12}}))?{_ZONE}",
         rf"{_MONTH_NAMED}(?:{_CLOCK}{_ZONE})?",
         # A date alone in this form may be three numbers of a version.
         rf"{_SHORT_YEAR}{_CLOCK}{_ZONE}",
