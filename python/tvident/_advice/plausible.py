@@ -39,6 +39,10 @@ _MOSTLY = 0.75
 """Of the samples, at which a parameter that changes has a sign."""
 
 
+_TOLD, _IN_COMMON = 2.0, 0.7
+"""Standard errors by which a stiffness that is there differs from zero: at most samples, and in the median of many windows."""
+
+
 @dataclass(frozen=True)
 class Plausible:
     """What is known of a call beside its numbers.
@@ -62,11 +66,13 @@ class Plausible:
 
     @np.errstate(all="ignore")
     def before(self, words: Words, angles: npt.NDArray[np.number], found: Estimates) -> Words:
-        """Return words with questions before them: about the units, and about the signs of every record."""
+        """Return words with questions before them, about units and the signs of every record, and behind them whether there is a spring."""
         records = np.asarray(angles).reshape(-1, angles.shape[-1])
         asked = [(*self._slow(), *self._far(one), *self._signs(found, place)) for place, one in enumerate(records)]
         if found.status.ndim == 1:
-            return replace(words, advice=(*asked[0], *words.advice))
+            is_said = any("stiffness=0" in line for line in words.advice)
+            spring = [] if is_said else self._no_spring(found)
+            return replace(words, advice=(*asked[0], *words.advice, *spring))
         lines = [f"record {place}: {line}" for place, each in enumerate(asked) for line in each]
         each = tuple(
             replace(one, advice=(*first, *one.advice)) for first, one in zip(asked, words.each, strict=bool(words.each))
@@ -143,6 +149,24 @@ class Plausible:
                 "act (instrument=)?"
             )
         return asked
+
+    def _no_spring(self, found: Estimates) -> list[str]:
+        """Return what to try where the stiffness of one record is not told from zero, and something else of its motion is told."""
+        if "stiffness" not in self.names or not any(self._sign(found, name, 0) for name in ("inertia", "damping")):
+            return []
+        values, errors = (np.asarray(of["stiffness"]).reshape(-1) for of in (found.values, found.errors))
+        errors = errors * np.asarray(found.factors.get("stiffness", 1.0)).reshape(-1)
+        known = np.isfinite(values) & (errors > 0) & np.isfinite(errors)
+        told = np.abs(values[known] / errors[known])
+        is_constant = np.ptp(values[known]) == 0 if told.size else False
+        near = (
+            abs(float(np.median(values[known]))) < _IN_COMMON * float(np.median(errors[known])) if told.size else False
+        )
+        if not told.size or float(np.quantile(told, _MOSTLY)) > _TOLD or not (is_constant or near):
+            return []
+        return [
+            "the stiffness is not told from zero: if nothing pulls the machine back, give stiffness=0, and the others are known better"
+        ]
 
     def _sign(self, found: Estimates, name: str, record: int) -> int:
         """Return 1 or -1 where the sign of an unknown is certain, 0 otherwise."""
