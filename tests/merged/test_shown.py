@@ -56,10 +56,7 @@ def test_what_was_saved_comes_back(made: Any, tmp_path: Path) -> None:
         assert loaded.identifiable == result.identifiable
         assert loaded.settings == result.settings
         assert loaded.record_status == result.record_status
-        # The record tells how much of the torque is explained.
-        assert loaded.summary().splitlines()[2:] == result.summary().splitlines()[2:]
-        assert result.summary().startswith(loaded.summary().splitlines()[0])
-        assert "was not kept" in loaded.summary().splitlines()[1]
+        assert loaded.summary() == result.summary()
         if made is masses:
             found, again = (one.modes.natural_frequency_stderr for one in (result, loaded))
             np.testing.assert_array_equal(again, found)

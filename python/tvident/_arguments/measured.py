@@ -27,7 +27,7 @@ def knows_its_unit(value: object) -> bool:
         return False
     if isinstance(value, dt.timedelta | np.timedelta64):
         return True
-    return bool(np.size(_plain(value)) == 1 and unit_said(value))
+    return bool(unit_said(value)) and np.size(_plain(value)) == 1
 
 
 def measured(name: str, value: Any) -> float | None:
