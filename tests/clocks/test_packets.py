@@ -112,3 +112,20 @@ def test_packets_of_samples_stay_at_their_times_beside_another_clock() -> None:
     angle, torque = moved(ours, 1e-3)[0], moved(theirs, 1e-3)[1]
     found = tvident.identify(angle, torque, t=(ours, theirs))
     assert not any("come in packets" in one for one in found.advice)
+
+
+@pytest.mark.parametrize(("rests", "rate"), [(0.5, 200.0), (1.0, 500.0), (2.0, 100.0)])
+def test_a_periodic_motion_that_is_recorded_in_bursts_stays_at_its_times(rests: float, rate: float) -> None:
+    """Where rests are whole periods it goes on from one burst to the next as if there were none: inertia was four times the true one."""
+    size = int(rests * rate)
+    number = np.arange(40 * size)
+    time = (number // size * 2 * size + number % size) / rate
+    omega, noise = 2 * np.pi / rests, np.random.default_rng(0)
+    angle = np.sin(omega * time) + 0.5 * np.sin(2 * omega * time + 1) + 0.3 * np.cos(3 * omega * time)
+    velocity = np.cos(omega * time) + np.cos(2 * omega * time + 1) - 0.9 * np.sin(3 * omega * time)
+    torque = 30 * angle + 0.4 * omega * velocity
+    channels = {
+        "angle": angle + 1e-3 * noise.standard_normal(time.size),
+        "torque": torque + 0.05 * noise.standard_normal(time.size),
+    }
+    assert evened_packets(grid_of(time), channels) is None

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from tvident._clocks.few_lines import left_by_lines
 from tvident._clocks.grid import Grid, Numbers
 
 _PAUSE = 1.5
@@ -29,6 +30,15 @@ _PAUSES = 0.25
 _SURE = 4.0
 """Standard errors between what samples that were taken evenly would show, or those that were not, and the middle of both."""
 
+_EXPLAINED = 0.2
+"""What few lines may leave of a channel to tell anything."""
+
+_BRIEF = 8.0
+"""Usual steps up to which a pause is short beside the motion."""
+
+_FAR_MORE, _MORE, _LITTLE = 8.0, 3.0, 0.01
+"""How many times as much lines leave by time if its samples are even; less where that is more by such a part of the channel."""
+
 _RARE, _SHARE = 1.5, 0.99
 """Pauses so many times as long as all but a hundredth are gaps of the record."""
 
@@ -36,7 +46,8 @@ _RARE, _SHARE = 1.5, 0.99
 def evened_packets(grid: Grid, channels: Mapping[str, npt.NDArray[np.number]]) -> tuple[Grid, str] | None:
     """Return a grid on which pauses between packets are no gaps, and a channel that says so; None where samples are at their times.
 
-    A channel goes on from one packet to the next by as much as it does within them: by sample number, or by time.
+    A channel goes on from one packet to the next by as much as it does within them: by sample number, or by time. A motion of few
+    frequencies may do both, as where it is periodic and rests are whole periods: then stamps hold.
     """
     found = _packets(grid)
     if found is None:
@@ -44,6 +55,9 @@ def evened_packets(grid: Grid, channels: Mapping[str, npt.NDArray[np.number]]) -
     borders, pauses = found
     said = {name: _are_even(grid.places, borders, values) for name, values in channels.items()}
     if not any(said.values()) or any(one is False for one in said.values()):
+        return None
+    is_long = float(np.median(pauses)) > _BRIEF
+    if is_long and not all(_leaves_more_by_time(grid.places, channels[name]) for name, one in said.items() if one):
         return None
     longest = _RARE * float(np.quantile(pauses, _SHARE, method="lower"))
     packets = borders[1:-1]
@@ -72,6 +86,16 @@ def _are_even(places: Numbers, borders: npt.NDArray[np.intp], values: npt.NDArra
     rows = values.reshape(-1, values.shape[-1])[:_ROWS]
     told = [one for row in rows if (one := _is_even(places, borders, row.astype(np.float64))) is not None]
     return None if not told else all(told)
+
+
+def _leaves_more_by_time(places: Numbers, values: npt.NDArray[np.number]) -> bool:
+    """Return whether few lines leave far more of a channel by time than by sample number, or explain it by neither."""
+    row = values.reshape(-1, values.shape[-1])[0].astype(np.float64)
+    by_number = left_by_lines(np.arange(row.size, dtype=np.float64), row)
+    by_time = left_by_lines(places / float(np.median(np.diff(places))), row)
+    if min(by_number, by_time) > _EXPLAINED:
+        return True
+    return bool(by_time > min(_FAR_MORE * by_number, _MORE * by_number + _LITTLE))
 
 
 def _is_even(places: Numbers, borders: npt.NDArray[np.intp], row: Numbers) -> bool | None:
