@@ -57,7 +57,8 @@ def test_a_drag_that_nothing_suspects_is_found_beside_a_stiffness_that_jumps(dra
     given = re.search(r"lag=([-+.e0-9]+)", advice)
     late = float(given[1]) if given else 0.0
     assert late * RATE == pytest.approx(lag, abs=0.1)
-    followed = tvident.identify(angle, torque, sample_rate=RATE, terms=["offset", "quadratic_drag"], lag=late)
+    kinds: dict[str, Any] = {name: "constant" for name in ("inertia", "damping") if f"{name}='constant'" in advice}
+    followed = tvident.identify(angle, torque, sample_rate=RATE, terms=["offset", "quadratic_drag"], lag=late, **kinds)
     for name, truth in (("quadratic_drag", drag), ("inertia", INERTIA), ("damping", DAMPING)):
         value, error, *_ = followed.value(name)
         assert value == pytest.approx(truth, abs=4 * error + 0.01 * truth), name
@@ -67,3 +68,22 @@ def test_of_a_sweep_without_drag_none_is_found() -> None:
     result = tvident.identify(*swept(0.0), sample_rate=RATE)
     assert result.summary().startswith("K(t) known to")
     assert not any("quadratic_drag" in line for line in result.advice)
+
+
+def test_a_part_of_a_record_does_not_tell_what_is_constant_elsewhere() -> None:
+    """The busiest part tells the lag; the stiffness jumps behind it, and was advised as constant."""
+    rng, t = np.random.default_rng(0), np.arange(40_000) / RATE
+    waves = [(2 * np.pi * one, rng.uniform(0, 2 * np.pi)) for one in np.linspace(0.8, 24, 40)]
+    size = np.where(t < 28, 0.01, 0.005)
+    angle = size * sum(np.sin(omega * t + phase) for omega, phase in waves)
+    velocity = size * sum(omega * np.cos(omega * t + phase) for omega, phase in waves)
+    acceleration = size * sum(-(omega**2) * np.sin(omega * t + phase) for omega, phase in waves)
+    stiffness = np.where(t < 28, 50.0, 75.0)
+    torque = 0.02 * acceleration + 0.2 * velocity + stiffness * angle
+    torque = np.concatenate([torque[:2], torque[:-2]]) + 1e-3 * torque.std() * rng.standard_normal(t.size)
+    angle = angle + 1e-4 * angle.std() * rng.standard_normal(t.size)
+    advice = next(line for line in tvident.identify(angle, torque, sample_rate=RATE).advice if "lag=" in line)
+    given = re.search(r"lag=([-+.e0-9]+)", advice)
+    assert given is not None
+    assert float(given[1]) * RATE == pytest.approx(2, abs=0.05)
+    assert "stiffness='constant'" not in advice

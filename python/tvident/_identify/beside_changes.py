@@ -63,7 +63,7 @@ class BesideChanges(TriedRecord):
         """
         if self._explains_nothing or not (suspects and any(isinstance(kind, str) for kind in self.given.values())):
             return None
-        allowed = {*suspects, *self._seen}
+        allowed = {*suspects, *(self._seen if self.result.record_status & CONTRADICTED else ())}
         for found in self._each_beside_changes():
             for names, result in found.items():
                 if not allowed.issuperset(names) or result.record_status & LEFT_OVER or not self._may_be(names, result):
@@ -196,7 +196,7 @@ class BesideChanges(TriedRecord):
         if "varying" not in (self.result.settings["kinds"][name] for name in ("inertia", "damping")):
             return None
         found = self._tried({**self.given, "stiffness": "constant"}, self._of_constants_alone)
-        if found is None or found.record_status & CONTRADICTED:
+        if found is None or found.record_status & CONTRADICTED or not self._stays(["stiffness"], found):
             return None
         left, known = self._left_of(found), self._better_known(found)
         is_worth_it = left.ratio <= BETTER or (left.is_as_much and known)

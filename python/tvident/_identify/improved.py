@@ -290,6 +290,7 @@ class Improvement(_AskedOfRecord):
                     beyond_chance,
                     there,
                     self._others,
+                    result,
                 )
         again, is_as_asked = partial(self._identify, data), self._is_as_asked
         return Trial(

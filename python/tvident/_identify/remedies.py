@@ -90,7 +90,7 @@ class Trial(BesideChanges):
         left, left_free = self._left_of(found), self._left_of(free)
         changing = [name for name in COEFFICIENTS if free.settings["kinds"][name] in {"windowed", "varying"}]
         is_as_good = bool(changing) and left.ratio <= AS_GOOD * left_free.ratio
-        is_simple = is_as_good and not self._follows_time(call, changing)
+        is_simple = is_as_good and self._stays(changing, found) and not self._follows_time(call, changing)
         best, of_best = (left, found) if is_simple else (left_free, free)
         if not (is_simple or chosen or is_none):
             return None

@@ -12,8 +12,8 @@ import numpy as np
 from tvident._arguments import with_error
 from tvident._equation import BUILT_IN, COEFFICIENTS
 from tvident._identify.left_over import Left, Unexplained, unexplained
-from tvident._identify.offered import NEARLY_ALL, SUSPECTED, feeds_energy, is_there, moved
-from tvident._results import Identification
+from tvident._identify.offered import MATTERS, NEARLY_ALL, SUSPECTED, feeds_energy, is_there, moved
+from tvident._results import Identification, median_of
 from tvident._status import Status
 
 WORTH = 0.9
@@ -30,6 +30,9 @@ LEFT_OVER = Status.RANK_DEFICIENT | Status.ILL_CONDITIONED | Status.NOISE_MODEL 
 
 CONTRADICTED = LEFT_OVER | Status.SCALES_DISAGREE | Status.KIND_CONTRADICTED
 """Flags of a record whose model something contradicts."""
+
+_APART, _KNOWN, _MOSTLY = 4.0, 0.1, 0.9
+"""A parameter stays what it is where it is so many errors away, these are at most such a part of it, and both at so many of the samples."""
 
 Call = dict[str, Any]
 
@@ -61,6 +64,8 @@ class TriedRecord:
         What was found of these samples where they are a part of a record, which is what advice is about.
     others : sequence of str
         Terms that nothing suspects and that a first look may find.
+    whole : Identification, optional
+        What was found of the whole record, where a part of it is tried.
     """
 
     identify: Callable[..., Identification]
@@ -72,6 +77,7 @@ class TriedRecord:
     beyond_chance: Sequence[str] = ()
     at_hand: Identification | None = None
     others: Sequence[str] = ()
+    whole: Identification | None = None
     _now: dict[int | None, Unexplained] = field(default_factory=dict, init=False, repr=False)
     _beside: dict[int, dict[Names, Identification]] = field(default_factory=dict, init=False, repr=False)
     _looks: dict[Names, float] = field(default_factory=dict, init=False, repr=False)
@@ -119,6 +125,22 @@ class TriedRecord:
         now = self._now[ahead]
         return Left(now if found is self.result else unexplained(found, ahead), now)
 
+    def _stays(self, names: Sequence[str], found: Identification) -> bool:
+        """Return whether parameters that are constant in a part of a record are known to be the same elsewhere in it.
+
+        A part tells what is missing, and not what changes beside it.
+        """
+        if self.whole is None:
+            return True
+        for name in names:
+            values, errors = getattr(self.whole, name), self.whole.stderr[name]
+            value, error = median_of(found, name)
+            least = MATTERS * abs(value)
+            near = np.abs(values - value) <= np.maximum(_APART * np.hypot(errors, error), least)
+            if not np.mean(near & (errors <= np.maximum(_KNOWN * abs(value), least))) >= _MOSTLY:
+                return False
+        return True
+
     def _with(self, call: Call, *changes: str) -> Call:
         terms = [one for one in changes if one != "lag"]
         return call | {"terms": [*call["terms"], *terms]} | ({"lag": "auto"} if "lag" in changes else {})
@@ -160,11 +182,14 @@ class TriedRecord:
         return moved(found, self.result, self.at_hand, unknown, is_more=is_more)
 
     def _change(self, names: Names, found: Identification) -> str:
-        """Return how suspects are given."""
+        """Return how suspects are given, and what was constant beside them that changes at hand."""
         terms = [one for one in names if one != "lag"]
         shown = [term if isinstance(term, str) else term.name for term in (*self.terms, *terms)]
         changes = [f"terms={shown}"] if terms else []
-        return ", ".join(changes + ([f"lag={found.settings['lag']:.4g}"] if "lag" in names else []))
+        changes += [f"lag={found.settings['lag']:.4g}"] if "lag" in names else []
+        now, then = self.result.settings["kinds"], found.settings["kinds"]
+        settled = [one for one in ("inertia", "damping") if (now[one], then[one]) == ("varying", "constant")]
+        return ", ".join([*changes, *(f"{one}='constant'" for one in settled if self._stays([one], found))])
 
     def _suspicion(self, name: str, found: Identification) -> str:
         if name == "lag":
