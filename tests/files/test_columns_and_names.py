@@ -105,6 +105,19 @@ def test_a_row_of_separators_is_a_row(tmp_path: Path, separator: str, odd: str) 
         np.testing.assert_array_equal(recordings.read(path)["a"], [0.5, np.nan, 1.5, 2.5])
 
 
+@pytest.mark.parametrize("odd", ["1.5", "inf"])
+@pytest.mark.parametrize("end", ["\n", ""])
+@pytest.mark.parametrize("tabs", ["\t", " \t", "\t "])
+@pytest.mark.parametrize("place", [1, 3, 5])
+def test_fewer_tabs_than_columns_are_no_row(tmp_path: Path, place: int, tabs: str, end: str, odd: str) -> None:
+    """Such a line was refused for its number of cells; as the last one it must not cost the row above it."""
+    lines = ["t\ta\tb", *(f"{row}\t{row / 2}\t{odd}" for row in range(4))]
+    lines.insert(place, tabs)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", recordings.FileWarning)
+        np.testing.assert_array_equal(recordings.read(written(tmp_path, "\n".join(lines) + end))["t"], range(4))
+
+
 @pytest.mark.parametrize(
     "name", ["unix_time", "Elapsed Time", "Running time", "rel. time", "Messzeit", "time_unix", "abs time"]
 )

@@ -147,7 +147,7 @@ class Rows:
         for line in reversed(lines):
             if line.replace(separator, "").strip():
                 break
-            hollow += separator in line
+            hollow += separator in line and not self._is_blank(line)
         self.hollow = self.hollow + rows if hollow >= rows else hollow
 
     @property
@@ -250,8 +250,7 @@ class Rows:
         rows = []
         for place, whole in enumerate(lines, self._line + 1):
             line = without_comment(whole)
-            # A line of tabs is a row in which nothing was measured, as a line of commas is.
-            if not (line.strip(" \r\n") if self._dialect.separator == "\t" else line.strip()) or self._is_remark(line):
+            if self._is_blank(line) or self._is_remark(line):
                 if self._width == 1 and place < self._line + len(lines) and not whole.lstrip().startswith("#"):
                     self._blank = place
                 continue
@@ -259,6 +258,12 @@ class Rows:
             if row is not None:
                 rows.append(row)
         return np.array(rows, dtype=np.float64).reshape(-1, self._width)
+
+    def _is_blank(self, line: str) -> bool:
+        """Return whether a line says nothing; tabs are a row in which nothing was measured only if they are as many as in other rows."""
+        if line.strip():
+            return False
+        return self._dialect.separator != "\t" or len(split(line, "\t")) < max(2, self._width)
 
     def _is_remark(self, line: str) -> bool:
         """Return whether a line is a comment about what is missing; of as many cells as columns it may be a row of what is missing."""
