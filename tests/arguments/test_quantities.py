@@ -106,6 +106,24 @@ def test_another_quantity_is_refused(given: dict[str, Any], words: str) -> None:
         inertia(**given)
 
 
+@pytest.mark.parametrize(
+    ("duration", "words"),
+    [
+        (np.timedelta64(10), "10 without a unit"),
+        (np.timedelta64(1, "M"), "1 months"),
+        (np.timedelta64(1, "Y"), "1 years"),
+        (np.timedelta64("NaT"), "NaT"),
+        (np.timedelta64("NaT", "ms"), "NaT"),
+    ],
+)
+def test_a_duration_of_numpy_has_a_length(duration: Any, words: str) -> None:
+    """Without a unit it was seconds, of months the words were those of NumPy."""
+    with pytest.raises(ValueError, match=f"delta must be a duration in weeks, .*; got {words}; give seconds, or "):
+        inertia(delta=duration)
+    with pytest.raises(ValueError, match=f"lag must be a duration .*; got {words}; give seconds, or "):
+        inertia(sample_rate=1000, lag=duration)
+
+
 def test_a_period_that_knows_its_unit_needs_no_other() -> None:
     with pytest.raises(TypeError, match=r"delta says its unit itself; .*leave time_unit out"):
         inertia(delta=1 * UNIT.ms, time_unit="ms")

@@ -36,7 +36,7 @@ def measured(name: str, value: Any) -> float | None:
     Raises
     ------
     ValueError
-        If it is a quantity of another kind.
+        If it is a quantity of another kind, or a duration of no length in seconds.
     """
     wanted = _UNITS.get(name)
     if wanted is None or not knows_its_unit(value):
@@ -44,12 +44,24 @@ def measured(name: str, value: Any) -> float | None:
     if isinstance(value, dt.timedelta):
         return value.total_seconds() if wanted == "s" else None
     if isinstance(value, np.timedelta64):
-        return float(value / _SECOND) if wanted == "s" else None
+        return _seconds(name, value) if wanted == "s" else None
     factor = factor_between(unit_said(value), wanted, name=name)
     try:
         return float(np.asarray(_plain(value), dtype=np.float64).reshape(-1)[0]) * factor
     except (TypeError, ValueError):  # of words with a unit
         return None
+
+
+def _seconds(name: str, value: np.timedelta64) -> float:
+    """Return the seconds of a duration of NumPy; one without a unit says nothing, and months and years have no length."""
+    unit = np.datetime_data(value.dtype)[0]
+    if np.isnat(value) or unit in {"generic", "M", "Y"}:
+        got = "NaT" if np.isnat(value) else f"{value.astype(int)} without a unit" if unit == "generic" else str(value)
+        raise ValueError(
+            f"{name} must be a duration in weeks, days, hours or a smaller unit; got {got}; give seconds, or "
+            f"numpy.timedelta64(1, 'ms')"
+        )
+    return float(value / _SECOND)
 
 
 def _plain(value: Any) -> Any:
