@@ -89,6 +89,21 @@ def test_a_whole_table_is_no_channel(package: Any) -> None:
     np.testing.assert_allclose(CALL(*alone, sample_rate=1000).constants["inertia"][0], PLAIN, rtol=1e-12)
 
 
+@pytest.mark.parametrize("names", [("T1", "T2"), ("t1", "t2"), ("T 1", "T 2"), ("T_1", "T_2", "T_3")])
+def test_numbered_torques_are_no_times(names: tuple[str, ...]) -> None:
+    """They are called by the letter of times, and all were said to be some."""
+    angles = pd.DataFrame({f"q{name[-1]}": TABLE["angle"].to_numpy() for name in names})
+    torques = pd.DataFrame({name: TABLE["torque"].to_numpy() for name in names})
+    found = CALL(angles, torques, sample_rate=1000).constants["inertia"][0]
+    np.testing.assert_allclose(found, np.full(found.shape, PLAIN), rtol=1e-9)
+    with pytest.raises(TypeError, match=r"'time' is called as times are; pass .* torque as table\['T1'\]"):
+        CALL(
+            angles,
+            torques.set_axis(["time", *(f"T{place}" for place in range(1, len(names)))], axis=1),
+            sample_rate=1000,
+        )
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,9 @@ _MOST_NAMES = 6
 
 _NO_RECORD = 32
 """Samples that no record of a batch is shorter than."""
+
+_NUMBERED = re.compile(r"[tT][ _.-]?\d+")
+"""Records of a channel that is called by one letter."""
 
 
 def channel(name: str, values: npt.ArrayLike) -> npt.NDArray[np.number]:
@@ -67,7 +71,7 @@ def _check_no_whole_tables(values: Mapping[str, Any]) -> None:
     tables = {name: value for name, value in there.items() if len(value.columns) > 1}
     for name, table in tables.items():
         columns = [str(one) for one in table.columns]
-        times = [one for one in columns if is_called_time(named_unit(one)[0])]
+        times = _times_among(columns)
         again = [other for other, value in tables.items() if value is table and other != name]
         if not times and not again:
             continue
@@ -79,6 +83,14 @@ def _check_no_whole_tables(values: Mapping[str, Any]) -> None:
             f"a channel must be one column, or a table with a column for each record; {which} of {', '.join(columns[:_MOST_NAMES])}{held}; "
             f"pass one column for each channel, {name} as table[{own!r}], say"
         )
+
+
+def _times_among(columns: Sequence[str]) -> list[str]:
+    """Return the columns that are called as times are beside others: T1 and T2 alone are torques."""
+    bare = {one: named_unit(one)[0] for one in columns}
+    times = [one for one, name in bare.items() if is_called_time(name)]
+    # Alone these are records. What has another name than a letter with a number is a time beside them.
+    return [one for one in times if not _NUMBERED.fullmatch(bare[one])] if len(times) == len(bare) else times
 
 
 def as_record(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[np.number]:
