@@ -22,11 +22,13 @@ def plain_comparison(result: Any) -> dict[str, Any]:
 def comparisons(result: Any) -> list[ExplainedTorque | None]:
     """Return how much of the torque of every record is explained; None of those beyond the first hundred, at which no verdict looks."""
     if result.inertia.ndim == 1:
-        return [explained_of(result)]
-    shape = result.inertia.shape[:-1]
-    places = list(np.ndindex(shape))
-    found = [explained_of(result[place if len(place) > 1 else place[0]]) for place in places[:RECORDS]]
-    return [*found, *[None] * (len(places) - len(found))]
+        return [result._explained_before or explained_of(result)]  # noqa: SLF001 - of this room
+    places = list(np.ndindex(result.inertia.shape[:-1]))
+    known = result._explained_each or [None] * len(places)  # noqa: SLF001 - of this room
+    return [
+        explained_of(result[place if len(place) > 1 else place[0]]) if one is None and index < RECORDS else one
+        for index, (place, one) in enumerate(zip(places, known, strict=True))
+    ]
 
 
 def held_back_from(plain: Mapping[str, Any] | None) -> HeldBack | None:

@@ -204,9 +204,21 @@ class Identification(Shown):
         return self._oscillator.damping_ratio
 
     def __getstate__(self) -> dict[str, Any]:
+        """Return what a pickle keeps: words, and of a single record all that its summary says, without the recording.
+
+        Of several records it keeps what decides the first line of the summary, and how much of held-back parts is explained only if that
+        was asked for before (:meth:`summary`, :meth:`held_back`): that takes as long as to identify them.
+        """
+        self._explained_each = comparisons(self)
+        if self.inertia.ndim == 1:
+            self.held_back()
         # What finds the words knows the record.
-        kept = {"_words": self._told, "_held_back": self.held_back(), "_explained_each": comparisons(self)}
-        return super().__getstate__() | kept
+        return super().__getstate__() | {"_words": self._told}
+
+    def __copy__(self) -> Identification:
+        copied = object.__new__(type(self))
+        copied.__dict__.update(self.__dict__)
+        return copied
 
     @property
     def _explained_before(self) -> ExplainedTorque | None:
