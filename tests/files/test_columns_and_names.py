@@ -74,6 +74,29 @@ def test_numbers_of_columns_are_no_sample(tmp_path: Path, first: int) -> None:
     assert next(iter(recordings.read(path).values())).size == 3
 
 
+SAMPLES = "".join(f"{k / 100},{1.5 + k / 8},{2.5 - k / 16}\n" for k in range(1, 30))
+
+
+@pytest.mark.parametrize(
+    "above",
+    [
+        "time,angle,torque\n",
+        "time,angle,torque\ns,rad,Nm\n",
+        "# time,angle,torque\n",
+        "Rig 7\n\ntime,angle,torque\n",
+        "",
+    ],
+)
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_first_sample_that_counts_is_a_sample(tmp_path: Path, above: str, first: int) -> None:
+    """Below names it was refused as a line of words, and without names the sample at 0 s was lost."""
+    below = SAMPLES if first == 0 else "".join(f"{line.replace('0.', '1.', 1)}\n" for line in SAMPLES.split())
+    channels = recordings.read(written(tmp_path, above + f"{first},{first + 1},{first + 2}\n" + below))
+    values = [one.tolist() for one in channels.values()]
+    assert [len(one) for one in values] == [30, 30, 30]
+    assert [one[0] for one in values] == [first, first + 1, first + 2]
+
+
 @pytest.mark.parametrize("text", ["t,a,b\n0,1,1,5,2,5\n0,2,1,6,2,6\n", "t,a\n1,2,5\n2,2,6\n", "a\n1,5\n2,5\n"])
 def test_a_comma_for_two_things_is_asked_for(tmp_path: Path, text: str) -> None:
     """It said that a name was missing for every other column."""

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import pairwise
 from typing import Literal
 
 from tvident._files.cells import Separator, is_comment, is_present, number, split, without_comment
@@ -28,6 +29,12 @@ _NOTES, _FEW = 3, 10
 
 _FEWEST_COUNTED = 3
 """Columns whose numbers are no chance."""
+
+_MOSTLY = 0.9
+"""Cells below numbers of columns that are fractions: some programs write 2 for 2.0."""
+
+_TWICE = 2
+"""How much longer than all others the first step of times may be, whose steps differ."""
 
 _FRACTION = re.compile(r"\d[.,]\d")
 
@@ -138,7 +145,7 @@ def _starts(lines: Sequence[str]) -> list[_Start]:
             if separator in found and found[separator].agree > 1:
                 continue
             cells = numbers(line, separator)
-            if not cells or _counts(cells, lines[index + 1 : index + 2], separator):
+            if not cells or _counts(cells, lines[:index], lines[index + 1 : index + 1 + _COMPARED], separator):
                 continue
             following = [one for one in lines[index : index + 2 * _COMPARED] if without_comment(one).strip()]
             agree = _agreeing(cells, [numbers(one, separator) for one in following[:_COMPARED]])
@@ -166,18 +173,36 @@ def _are_alike(are_times: Sequence[bool], cells: Sequence[str], row: Sequence[st
     )
 
 
-def _counts(cells: list[str], below: Sequence[str], separator: Separator) -> bool:
+def _counts(cells: list[str], above: Sequence[str], below: Sequence[str], separator: Separator) -> bool:
     """Return whether cells are the numbers of columns, as written above them where nothing has a name.
 
-    Without an empty cell before them the numbers below must be fractions: whole ones may be samples themselves.
+    Without an empty cell before them the numbers below must be fractions: whole ones may be samples themselves. Below names, or where
+    the first column goes on from them, they are the first sample.
     """
     columns = len(cells)
     if columns > 1 and cells == ["", *map(str, range(columns - 1))]:
         return True
     if columns < _FEWEST_COUNTED or cells not in ([str(first + one) for one in range(columns)] for first in (0, 1)):
         return False
-    rows = [split(line, separator) for line in below]
-    return all(len(row) == columns and all(_FRACTION.search(cell) for cell in row) for row in rows) and bool(rows)
+    if any(_are_words(split(line.lstrip(" #"), separator), columns) for line in above):
+        return False
+    rows = [split(line, separator) for line in below if without_comment(line).strip()]
+    if not rows or not all(map(_FRACTION.search, rows[0])) or len(rows[0]) != columns:
+        return False
+    fractions = sum(_FRACTION.search(cell) is not None for row in rows for cell in row)
+    return fractions >= _MOSTLY * columns * len(rows) and not _goes_on(cells[0], [row[0] for row in rows])
+
+
+def _are_words(cells: Sequence[str], columns: int) -> bool:
+    """Return whether cells may be the names of so many columns."""
+    return len(cells) == columns and all(cells) and not any(map(_is_number, cells))
+
+
+def _goes_on(first: str, below: Sequence[str]) -> bool:
+    """Return whether numbers rise from a first one, and from it no more than between them: times, or what counts samples."""
+    values = [number(cell, comma=True) for cell in (first, *below)]
+    steps = [after - before for before, after in pairwise(values) if before is not None and after is not None]
+    return len(steps) > 1 and min(steps) > 0 and steps[0] <= _TWICE * max(steps[1:])
 
 
 def _numbers(line: str, separator: Separator) -> list[str]:
