@@ -337,6 +337,25 @@ def test_an_option_that_may_be_repeated_is_a_list_or_one_value(folder: Path, lin
 
 
 @pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("missing = true", "missing must be one number or text or a list of them; got true"),
+        ("missing = [-9999, false]", "missing must be one number or text or a list of them; got false"),
+        ('angle = ["angle", "torque"]', "angle must be one number or text; got a list; write angle ="),
+        ("angle = true", "angle must be one number or text; got true"),
+        ("step = true", "step must be one number or text; got true; write step = 5"),
+        ("[angle]\nname = 3", "angle must be one number or text; got a table"),
+    ],
+)
+def test_an_option_is_no_other_kind_of_value(folder: Path, line: str, words: str) -> None:
+    """What is true was 1, which marked missing values, and a list was the name of a channel."""
+    (folder / "kinds.toml").write_text(line + "\n")
+    done = run(*IDENTIFY, "--settings", "kinds.toml")
+    assert done.returncode == 2
+    assert words in " ".join(done.stderr.split())
+
+
+@pytest.mark.parametrize(
     ("name", "content", "words"),
     [
         ("s.json", '{"a": 1,\n}', "it is no JSON from line 2, column 1 on"),

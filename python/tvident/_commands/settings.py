@@ -88,11 +88,29 @@ def options_from_toml(ctx: click.Context, path: str) -> str | None:
 
 def _as_typed(option: click.Parameter, value: Any) -> Any:
     """Return a value as it would be typed, where the option takes text; one value of an option that may be repeated is a list of one."""
+    _check_fits(option, value)
     if option.multiple and not isinstance(value, list):
         value = [value]
     if isinstance(value, list):
         return [_text(option, one) for one in value]
     return _text(option, value)
+
+
+def _check_fits(option: click.Parameter, value: Any) -> None:
+    """Refuse what would be read as something else: yes and no for a number or a name, and a list or a table for one of them."""
+    several = option.multiple or option.nargs != 1
+    each = value if isinstance(value, list) and several else [value]
+    is_flag = isinstance(option, click.Option) and option.is_flag
+    wrong = next((one for one in each if isinstance(one, dict | list) or (isinstance(one, bool) and not is_flag)), None)
+    if wrong is None:
+        return
+    what = "a list" if isinstance(wrong, list) else "a table" if isinstance(wrong, dict) else json.dumps(wrong)
+    name = max(option.opts, key=len).lstrip("-")
+    words = option.type.choices if isinstance(option.type, click.Choice) else ["text"]
+    example = "5" if option.type.name in {"float", "integer"} else json.dumps(words[0])
+    raise click.UsageError(
+        f"{name} must be one number or text{' or a list of them' * several}; got {what}; write {name} = {example}"
+    )
 
 
 def _text(option: click.Parameter, value: Any) -> Any:
