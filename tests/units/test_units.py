@@ -102,7 +102,7 @@ def test_every_symbol_means_what_pint_says(symbol: str) -> None:
         ("daNm", "daN*m"),
         *((text, "mm") for text in ("MM", "millimeters")),
         ("MN", "MN"),
-        ("MNm", "MN*m"),
+        *((text, "MN*m") for text in ("MN m", "MN*m", "MN-m")),
         ("COUNTS", "count"),
         ("KHZ", "kHz"),
         *((text, "second") for text in ("Sek.", "Sekunden")),
@@ -200,6 +200,13 @@ def test_words_are_no_units(text: str) -> None:
         ("Angle（deg）", ("Angle", "deg")),  # noqa: RUF001 - as Japanese programs write them
         ("Angle［left］", ("Angle", "left")),  # noqa: RUF001 - likewise
         ("TIME_MS", ("TIME", "ms")),
+        *(
+            (text, ("Torque", "MNm"))
+            for text in ("Torque [MNm]", "Torque_MNm", "Torque MNm", "Torque/MNm", "Torque in MNm")
+        ),
+        ("Torque (MNm) left", ("Torque left", "MNm")),
+        *((text, ("Torque", "mNm")) for text in ("Torque_mNm", "Torque_mnm", "Torque_MNM")),
+        *((text, ("t", "Ms")) for text in ("t/Ms", "t, Ms", "t in Ms", "t (Ms)")),
         ("TimeMS", ("Time", "ms")),
         ("timestampNs", ("timestamp", "ns")),
         ("Time..s.", ("Time", "s")),
@@ -295,6 +302,8 @@ def test_brackets_around_a_unit_are_none_of_it(text: str) -> None:
         ("time", "mS", "time_unit='ms'"),
         ("angle", "Mrad", "angle_unit='mrad'"),
         ("angle", "Mm", "angle_unit='mm'"),
+        ("torque", "MNm", "MN m as written; give torque_unit='mNm', or another"),
+        ("torque", "[MNm]", "torque_unit='mNm'"),
     ],
 )
 def test_a_capital_that_means_a_million_is_asked_for(quantity: str, text: str, cure: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from tvident._units.parse import unit_of
+from tvident._units.symbols import DOUBTFUL
 
 _IN_BRACKETS = re.compile(
     r"(.*?)[\s_/]*(?:\[([^\[\]]*)\]|\(([^()]*(?:\([^()]*\))?[^()]*)\)|\{([^{}]*)\}|<([^<>]*)>)\s*", re.DOTALL
@@ -71,7 +72,7 @@ def named_unit(name: str) -> tuple[str, str]:
     if within:
         unit = next(one for one in within.groups()[1:4] if one is not None).strip()
         words = " ".join(one for one in (within[1], within[5]) if one)
-        return (words, unit) if words and unit_of(unit) is not None else _without_brackets(name)
+        return (words, unit) if words and (unit_of(unit) is not None or unit in DOUBTFUL) else _without_brackets(name)
     return _without_brackets(name)
 
 
@@ -83,7 +84,7 @@ def _without_brackets(name: str) -> tuple[str, str]:
         return found[1], found[2].strip()
     found = _OF_TORQUES.fullmatch(name)
     if found:
-        return found[1], _TORQUES[found[2].lower()]
+        return found[1], found[2] if found[2] in DOUBTFUL else _TORQUES[found[2].lower()]
     found = _OF_TIMES.fullmatch(name)
     if found:
         unit = (found[2] or found[3]).lower()
@@ -101,7 +102,8 @@ def _is_unit_of(text: str, symbol: str) -> bool:
     """Return whether what stands behind a slash is the unit of the symbol before it: ``M/Nm``, ``s/mm``, but not ``m/s``."""
     unit = unit_of(text)
     if unit is None:
-        return text.strip().lower() in {"grad", "altgrad"}  # refused, since it may mean degrees or gon
+        # Refused: the first may mean degrees or gon, the others a million.
+        return text.strip().lower() in {"grad", "altgrad"} or text.strip() in DOUBTFUL
     length = unit_of("m")
     is_length = length is not None and unit.dimension == length.dimension
     return unit_of(symbol) is None or unit_of(f"{symbol}/{text}") is None or (symbol in _PATHS and is_length)

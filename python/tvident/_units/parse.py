@@ -70,6 +70,8 @@ def unit_of(text: str) -> Unit | None:
     if plain.startswith("(") and plain.endswith(")"):
         plain = plain[1:-1].strip()
     plain = _POWER.sub("^", plain.removesuffix(".").removesuffix("(s)"))
+    if plain in DOUBTFUL:
+        return None  # asked for
     if "grad" in plain.lower():
         return None  # degrees in German, gon in French, and no gram
     speed = ROTATIONS.get(plain.lower().replace(".", ""))

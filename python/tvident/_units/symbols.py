@@ -129,8 +129,9 @@ DOUBTFUL = {
     "Ms": "ms with a capital, megaseconds as written",
     "Mm": "mm with a capital, megametres as written",
     "Mrad": "mrad with a capital, megaradians as written",
+    "MNm": "mNm with a capital, MN m as written",
 }
-"""Units in letters that mean two things, of which nobody measures the one that is written, and what they mean."""
+"""Units in letters that mean two things, of which hardly anybody measures the one that is written, and what they mean."""
 
 NEVER_JOINED = frozenset(("K",))
 """Symbols that nothing is written to without a blank: KN is no K N."""
