@@ -12,6 +12,7 @@ import pytest
 import tvident
 from commands import run
 from tvident import recordings
+from tvident._advice.marks import marks_that_stay
 
 RIG = tvident.simulate_torsional_rig(duration=3.0)
 
@@ -151,3 +152,15 @@ def test_advice_asks_for_marks_in_arrays(channel: str, unit: str, where: slice) 
     assert result.advice[0].startswith(f"the {channel} is -9999 at ")
     assert "missing=-9999" in result.advice[0]
     assert not any("degrees?" in one for one in result.advice)
+
+
+@pytest.mark.parametrize("level", [999.0, 9999.0, 32767.0])
+def test_a_torque_that_is_turned_on_and_off_is_no_mark(level: float) -> None:
+    """A drive that stands at a number that programs write for nothing, again and again, was measured there."""
+    number = np.arange(8000)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal((2, number.size))
+    is_on = number // 500 % 2 == 0
+    torque = np.where(is_on, level, noise[0])
+    assert marks_that_stay({"torque": torque}, {"torque": 1.0}, 1e-3) == []
+    for missing in (np.where(is_on, -level, noise[0]), np.where(number // 500 == 3, level, noise[0])):
+        assert len(marks_that_stay({"torque": missing}, {"torque": 1.0}, 1e-3)) == 1

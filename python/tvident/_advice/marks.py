@@ -12,6 +12,9 @@ from tvident._arguments import CLOSE_TO_MARK, mark_in
 MARKED = "does it mark values that are missing?"
 """What the questions have in common."""
 
+_TURNS, _PART = 4, 0.1
+"""Times that a torque stands at a number above zero, and the part of all samples, from which on a drive is turned on and off."""
+
 _MOMENT = 50
 """Samples: what stands for less is a reading that failed, which is seen, left out and said."""
 
@@ -48,6 +51,9 @@ def _words(name: str, recorded: npt.NDArray[np.number], factor: float, period: f
     places = np.flatnonzero(are_marks)
     runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
     if max(map(len, runs)) <= _MOMENT and not are_marks[0] and not are_marks[-1]:
+        return ""
+    is_often = len(runs) >= _TURNS and count >= _PART * recorded.size and min(map(len, runs)) > 1
+    if name == "torque" and mark > 0 and is_often:
         return ""
     where = f"the {name} is {mark:.7g} at {count} samples, first at {places[0] * period:.4g} s, far from all its other values"
     cure = f"give numpy.nan in its place, or read the file with missing={mark:.7g}"
