@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from tvident._arguments import listed, mark_in, told_once
+from tvident._arguments import MAY_BE_DAYS, listed, mark_in, told_once
 from tvident._results import Estimates, Words
 from tvident._units import ROTARY, Axis
 
@@ -29,15 +29,11 @@ _UNITS = ((1e-3, "milliseconds", "ms"), (1e-6, "microseconds", "us"), (1e-9, "na
 _SLOWEST, _FASTEST = 20.0, 110e3
 """Rates in Hz between which a unit is possible: motion is hardly sampled more slowly, and vibration at up to 102.4 kHz."""
 
-_DAYS = 2e-7
-"""A sample period in seconds, 5 MHz, up to which it may be in days, as spreadsheets and datenum count: 60 Hz or more."""
-
 _CERTAIN = 4.0
 """Standard errors by which a number differs from zero: one of 16 000 does so by chance."""
 
 _MOSTLY = 0.75
 """Of the samples, at which a parameter that changes has a sign."""
-
 
 _TOLD, _IN_COMMON = 2.0, 0.7
 """Standard errors by which a stiffness that is there differs from zero: at most samples, and in the median of many windows."""
@@ -102,7 +98,7 @@ class Plausible:
     def _slow(self) -> list[str]:
         if "time" not in self.axis.assumed:
             return []
-        if self.period <= _DAYS:
+        if self.period <= MAY_BE_DAYS:
             return [
                 f"there is one sample in {self.period:.4g} s: is the time in days? Then give time_unit='days' with t= or delta="
             ]
@@ -157,12 +153,12 @@ class Plausible:
         values, errors = (np.asarray(of["stiffness"]).reshape(-1) for of in (found.values, found.errors))
         errors = errors * np.asarray(found.factors.get("stiffness", 1.0)).reshape(-1)
         known = np.isfinite(values) & (errors > 0) & np.isfinite(errors)
-        told = np.abs(values[known] / errors[known])
-        is_constant = np.ptp(values[known]) == 0 if told.size else False
-        near = (
-            abs(float(np.median(values[known]))) < _IN_COMMON * float(np.median(errors[known])) if told.size else False
-        )
-        if not told.size or float(np.quantile(told, _MOSTLY)) > _TOLD or not (is_constant or near):
+        if not known.any():
+            return []
+        values, errors = values[known], errors[known]
+        is_told = np.quantile(np.abs(values / errors), _MOSTLY) > _TOLD
+        is_constant, near = np.ptp(values) == 0, abs(np.median(values)) < _IN_COMMON * np.median(errors)
+        if is_told or not (is_constant or near):
             return []
         return [
             "the stiffness is not told from zero: if nothing pulls the machine back, give stiffness=0, and the others are known better"

@@ -33,6 +33,7 @@ from tvident._arguments.paths import path_of
 from tvident._arguments.progress import Progress, WatchedProgress, reporter
 from tvident._arguments.ranges import finite, percentiles, told_once
 from tvident._arguments.sampling import (
+    MAY_BE_DAYS,
     check_power,
     check_window,
     delay,
@@ -59,6 +60,7 @@ from tvident._choices import NanPolicy, RowPolicy
 __all__ = [
     "CLOSE_TO_MARK",
     "LARGEST",
+    "MAY_BE_DAYS",
     "Labels",
     "NanPolicy",
     "NotUniformError",

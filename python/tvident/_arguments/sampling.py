@@ -17,6 +17,9 @@ from tvident._units import times_in_seconds
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0}
 
 
+MAY_BE_DAYS = 2e-7
+"""A sample period in seconds, 5 MHz, up to which it may be in days, as spreadsheets and datenum count: 60 Hz or more."""
+
 _SHORTEST, _LONGEST = 1e-30, 1e30
 """Sample periods in seconds: nothing is recorded faster or more slowly, and beyond them numbers leave the range of doubles."""
 

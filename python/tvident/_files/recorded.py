@@ -291,10 +291,6 @@ class FileRecording(Mapping[str, Channel]):
         }
 
 
-_DAYS = 2e-7
-"""A sample period in seconds up to which it may be in days: 60 Hz or more."""
-
-
 def _rate_of(name: str, value: Channel) -> float | None:
     """Return the samples per second that a single number says, None where it is called otherwise or cannot be one."""
     bare, number = name.rpartition(".")[2], float(value.reshape(-1)[0])
@@ -317,7 +313,7 @@ def _check_no_counts(time: npt.NDArray[np.float64]) -> None:
                 f"'time [{unit}]', or give t= and time_unit='{unit}', if it counts {word} since 1970"
             )
     step = float(time[-1] - time[0]) / (time.size - 1)
-    if 0 < step <= _DAYS:
+    if 0 < step <= arguments.MAY_BE_DAYS:
         raise ValueError(
             f"one sample in {step:.4g} s would be {1 / step:.4g} Hz; call the channel 'time [days]', or give t= and time_unit='days', if "
             "it counts days, as datenum of MATLAB and spreadsheets do"
