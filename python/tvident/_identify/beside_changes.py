@@ -46,8 +46,9 @@ class BesideChanges(TriedRecord):
             best = min(as_good, key=lambda names: (len(names), left_of[names].ratio))
             left, result = left_of[best], found[best]
             if holds(left.least.share, result.record_status) and left.least.share < 1:
-                suspicions = ", ".join(self._suspicion(one, result) for one in best)
-                words = f"{suspicions}: try {self._change(best, result)}; {left}{self._moved(result)}"
+                words = (
+                    f"{self._suspicions(best, result)}: try {self._change(best, result)}; {left}{self._moved(result)}"
+                )
                 return Remedy(left.ratio, words, are_distinguished(result.record_status), share=left.least.share)
         return None
 
@@ -70,9 +71,11 @@ class BesideChanges(TriedRecord):
                     continue
                 moved = self._moved(result)
                 if moved:
-                    suspicions = ", ".join(self._suspicion(one, result) for one in names)
                     change = self._change(names, result)
-                    return names, f"{suspicions}: give {change}; then nothing else is suspected{moved}"
+                    return (
+                        names,
+                        f"{self._suspicions(names, result)}: give {change}; then nothing else is suspected{moved}",
+                    )
         return None
 
     def _each_beside_changes(self) -> Iterator[dict[Names, Identification]]:
@@ -130,7 +133,7 @@ class BesideChanges(TriedRecord):
         there = [
             names for names, result in self._beside.get(0, {}).items() if all(is_there(one, result) for one in names)
         ]
-        lag: list[Names] = [("lag",)] if "lag" in self.suspects and "lag" in self._seen else []
+        lag: list[Names] = [("lag",)] if "lag" in self._seen else []
         suspected: list[Names] = [(one,) for one in self.suspects if one in self.beyond_chance]
         return list(dict.fromkeys([*lag, *suspected, *there]))
 
@@ -140,11 +143,6 @@ class BesideChanges(TriedRecord):
 
     def _left_at_given_lengths(self, names: Names) -> float:
         """Return the mean square of what equations of given lengths leave with these terms, beside constants."""
-        if names not in self._looks:
-            self._looks[names] = self._look_at(names)
-        return self._looks[names]
-
-    def _look_at(self, names: Names) -> float:
         call, kinds = self._with(self._of_constants_alone, *names), self._beside_constants
         lengths = self._lengths_of_look
         if not any(isinstance(kind, str) and kind == "windowed" for kind in kinds.values()):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 
 import numpy as np
 
@@ -26,7 +27,7 @@ class FirstLook:
     """
 
     def __init__(self, left: Callable[[Names], float]) -> None:
-        self._left = left
+        self._left = cache(left)
 
     @property
     def tells(self) -> bool:

@@ -67,7 +67,7 @@ def is_to_be_tried(data: Data, request: Request, found: Sequence[_core.Identific
     """Return whether something contradicts the model of a single record in weak form, and there is something to change."""
     if not isinstance(request.form, WeakForm) or data.instruments is not None or data.batch:
         return False
-    if any(defect.name in _MENDED_FIRST for defect in found[0].defects):
+    if _is_marked(data) or any(defect.name in _MENDED_FIRST for defect in found[0].defects):
         return False
     flags = found[0].record_status
     if flags & Status.RANK_DEFICIENT:
@@ -86,7 +86,12 @@ def _is_contradicted(found: _core.Identification) -> bool:
 
 def is_told_by_weak_form(data: Data, request: Request) -> bool:
     """Return whether a record is a single one in strong form, of which the weak form takes any part as well."""
-    return isinstance(request.form, StrongForm) and data.is_plain and data.time.size > 0
+    return isinstance(request.form, StrongForm) and data.is_plain and data.time.size > 0 and not _is_marked(data)
+
+
+def _is_marked(data: Data) -> bool:
+    """Return whether it is asked if numbers mark missing values: whatever is tried would explain what was never measured."""
+    return any(MARKED in line for _, line in data.doubts)
 
 
 def is_doubted(flags: int) -> bool:
@@ -144,8 +149,6 @@ class TriedInWeakForm(_AskedOfRecord):
 
     def words(self, _: Identification, words: Words) -> Words:
         """Return words that begin with what explains more in weak form, if anything does."""
-        if any(MARKED in line for _, line in self.data.doubts):
-            return words
         try:
             advice = self._in_weak_form(self._part()).advice
         except ValueError:
@@ -228,8 +231,6 @@ class Improvement(_AskedOfRecord):
 
     def words(self, result: Identification, words: Words) -> Words:
         """Return words that begin with what to change, without what was tried in vain."""
-        if any(MARKED in line for _, line in self.data.doubts):
-            return words  # whatever is tried would explain what was never measured
         if not (_is_contradicted(self.found) or self.found.record_status & Status.RANK_DEFICIENT):
             return self._without_worse_offset(result, words)
         trial = self._trial(result)
@@ -268,7 +269,13 @@ class Improvement(_AskedOfRecord):
     def _trial(self, result: Identification) -> Trial:
         """Return the trial of the record, or of its busiest part where that tells as much."""
         data, some = self.data, self._busiest_part
-        beyond_chance = [one.name for one in self._explained.suspects]
+        trial = partial(
+            Trial,
+            terms=self.asked_terms,
+            suspects=self._suspects,
+            beyond_chance=[one.name for one in self._explained.suspects],
+            others=self._others,
+        )
         if some is not None:
             given = {name: kind if isinstance(kind, str) else cut(kind, some) for name, kind in self.given.items()}
             identify = partial(self._identify, data.stretch(some))
@@ -280,22 +287,8 @@ class Improvement(_AskedOfRecord):
                 found = None
             if found is not None:
                 is_as_asked = self.request.lag != "auto"
-                return Trial(
-                    identify,
-                    found,
-                    given,
-                    self.asked_terms,
-                    self._suspects,
-                    is_as_asked,
-                    beyond_chance,
-                    there,
-                    self._others,
-                    result,
-                )
-        again, is_as_asked = partial(self._identify, data), self._is_as_asked
-        return Trial(
-            again, result, self.given, self.asked_terms, self._suspects, is_as_asked, beyond_chance, others=self._others
-        )
+                return trial(identify, found, given, is_as_asked=is_as_asked, at_hand=there, whole=result)
+        return trial(partial(self._identify, data), result, self.given, is_as_asked=self._is_as_asked)
 
     @cached_property
     def _busiest_part(self) -> slice | None:

@@ -80,7 +80,6 @@ class TriedRecord:
     whole: Identification | None = None
     _now: dict[int | None, Unexplained] = field(default_factory=dict, init=False, repr=False)
     _beside: dict[int, dict[Names, Identification]] = field(default_factory=dict, init=False, repr=False)
-    _looks: dict[Names, float] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def _worth(self) -> float:
@@ -190,6 +189,9 @@ class TriedRecord:
         now, then = self.result.settings["kinds"], found.settings["kinds"]
         settled = [one for one in ("inertia", "damping") if (now[one], then[one]) == ("varying", "constant")]
         return ", ".join([*changes, *(f"{one}='constant'" for one in settled if self._stays([one], found))])
+
+    def _suspicions(self, names: Sequence[str], found: Identification) -> str:
+        return ", ".join(self._suspicion(name, found) for name in names)
 
     def _suspicion(self, name: str, found: Identification) -> str:
         if name == "lag":
