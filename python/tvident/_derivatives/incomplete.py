@@ -122,7 +122,7 @@ def left_out(length: int, longest_gap: int | None) -> Incomplete:
 
 
 def check_weighted(*, automatic: bool, weighted: bool, selection: str) -> None:
-    """Check what does not go with weights, of which every window is decomposed on its own, or with a least number of samples."""
+    """Check what does not go with weights, of which every window has polynomials of its own, or with a least number of samples."""
     wrong = [
         ("window_length", "a length", "'auto'", automatic),
         ("selection", "'window'", repr(selection), weighted and selection != "window"),

@@ -103,7 +103,7 @@ def fit_local_polynomials(
         the bits are the same.
     weights : array_like, shape (n,) or that of `y`, optional
         Weight of every sample, not negative: one over the variance of its noise, relative to the others. A sample of weight 0 is left out,
-        whatever it holds. ``sigma`` is then that of a sample of weight 1. Every window is decomposed on its own, as those beside gaps are.
+        whatever it holds. ``sigma`` is then that of a sample of weight 1. Every window has polynomials of its own, as those beside gaps have.
     period : float, optional
         Period of a wrapped angle in the unit of `y`: 2π or 360. Whole periods are added first so that steps are the shortest that are
         possible. A sample after a step of 0.4 to 0.6 periods, which may go either way, counts as missing. ``settings["splits"]`` lists the
@@ -168,13 +168,13 @@ def fit_local_polynomials(
     bridged where their neighbours tell them as well as samples would, and estimates within a window of a missing one are made as below, in
     the best windows: on sums of sines with 1, 5 and 30 % of the samples missing at random the errors are 1.0 to 1.1, 1.0 to 1.2 and mostly
     1.2 to 1.8 (one of 36 records: 2.8) times those without a gap, and nominal 95 % intervals of the second derivative cover 66 to 90 %.
-    It takes two to five times as long where few windows hold a gap, and up to 300 times where nearly all do, as with 1 % missing at random
-    and windows of 800 samples for a slow motion: each takes some 0.2 ms then, of those at every `step`-th sample.
+    It takes two to five times as long where few windows hold a gap, and up to 100 times where nearly all do, as with 1 % missing at random
+    and windows of 800 samples for a slow motion: each takes some 10 µs then, of those at every `step`-th sample.
 
-    With ``nan_policy="omit"`` a window that lacks samples is fitted by the QR decomposition of its own design, and each derivative takes
+    With ``nan_policy="omit"`` a window that lacks samples is fitted by polynomials that are orthogonal on the others, and each derivative takes
     the order with the least estimated squared bias plus variance, since such a window is not symmetric. Its standard errors are those of
     that order with the bias; that the order was chosen is not in them, so that nominal 95 % intervals cover 80 to 95 %. A
-    derivative above the order is zero and has no standard error (NaN). This costs some 50 µs a window of 201 samples and thread.
+    derivative above the order is zero and has no standard error (NaN). This costs some 2 µs a window of 201 samples and thread.
 
     Where `t` is not uniform every window has a design of its own, and derivatives are those at each sample's own time. A duration takes
     the samples that lie in it, however many; windows with fewer than 5 are NaN. ``"auto"`` chooses window and order of every derivative
@@ -184,7 +184,7 @@ def fit_local_polynomials(
     order without its bias: nominal 95 % intervals cover 84 to 96 %. ``"pooled"`` and ``"average"`` need uniform times. A window of
     51 to 2001 samples takes 0.15 to 0.8 µs with AVX2, where `step` is far below its length and at most five derivatives are asked for:
     neighbours share one basis. Standard errors take 0.2 to 0.9 µs, when they are asked for. At the ends, near gaps and outliers each is
-    decomposed on its own, in some 20 µs with 201 samples, as all are where weights differ.
+    fitted on its own, in some 2 µs with 201 samples, as all are where weights differ.
 
     The cost is about 15 ns a sample and thread for any window length on a processor with AVX-512, about twice that with AVX2; averaged
     about twice as much; pooled about 300 ns, because the orders of every window need logarithms; ``"auto"`` about 5 µs a sample and

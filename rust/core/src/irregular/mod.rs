@@ -1,9 +1,6 @@
 //! Samples whose times are not uniform: splines that bring channels onto a uniform grid, what that does to noise, and polynomials in windows.
 
 pub(crate) mod lists_in_lanes;
-pub(crate) mod order_sums;
-pub(crate) mod order_table;
-pub(crate) mod own_basis;
 pub(crate) mod passed_noise;
 pub(crate) mod resampling;
 pub(crate) mod shared_buffers;
@@ -12,6 +9,8 @@ pub(crate) mod shared_factor;
 pub(crate) mod shared_sums;
 pub(crate) mod shared_windows;
 pub(crate) mod spline;
+pub(crate) mod table_columns;
+pub(crate) mod window_alone;
 pub(crate) mod window_estimates;
 pub(crate) mod window_fit;
 pub(crate) mod window_places;

@@ -1,7 +1,7 @@
 //! The order of windows side by side, their derivatives and standard errors: as [`crate::irregular::window_fit`] has them for a window alone.
 
-use crate::irregular::order_table::TableColumns;
 use crate::irregular::shared_sums::{DERIVATIVES, MOST};
+use crate::irregular::table_columns::TableColumns;
 use crate::simd::aligned::OnLines;
 use crate::simd::vectors::Lanes;
 

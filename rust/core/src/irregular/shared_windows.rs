@@ -7,15 +7,16 @@
 use std::array::from_fn;
 use std::ops::Range;
 
-use crate::irregular::order_table::{OrderTable, TableColumns};
 use crate::irregular::shared_buffers::{GroupSamples, Moves, SlidSums};
 use crate::irregular::shared_choice::{OrderResiduals, OrderShares, SharedChoice, sums};
 use crate::irregular::shared_factor::SharedFactor;
 use crate::irregular::shared_sums::{DERIVATIVES, MOST, at};
+use crate::irregular::table_columns::TableColumns;
 use crate::irregular::window_estimates::{WindowFit, WindowFits};
 use crate::irregular::window_places::{Numbered, PlacedWindow, WindowGroup, WindowSpan};
 use crate::lanes::tile::{Tile, WindowFields};
 use crate::local_polynomials::options::Order;
+use crate::local_polynomials::order_table::OrderTable;
 use crate::local_polynomials::sliding_projection::ROUNDING;
 use crate::simd::aligned::OnLines;
 use crate::simd::vectors::{Kernel, Lanes, MOST_LANES};

@@ -1,7 +1,5 @@
 //! What is asked of windows whose samples have times of their own, and where what is found in them goes.
 
-use std::ops::Range;
-
 use crate::irregular::window_places::WindowSpan;
 use crate::local_polynomials::options::Order;
 use crate::status::Status;
@@ -41,14 +39,6 @@ pub struct WindowFits<'a> {
 }
 
 impl WindowFit {
-    /// The root of the greatest weight of some samples, and the roots of all over it; 1 and nothing where all count alike.
-    pub(crate) fn roots_of_weights(&self, samples: Range<usize>) -> (f64, Option<Vec<f64>>) {
-        let Some(weights) = &self.weights else { return (1.0, None) };
-        let some = &weights[samples];
-        let greatest = some.iter().copied().fold(0.0, f64::max);
-        (greatest.sqrt(), Some(some.iter().map(|weight| (weight / greatest).sqrt()).collect()))
-    }
-
     /// The status of a window of which an order was taken.
     pub(crate) fn status(&self, order: usize, degrees: usize, edge: bool, exact: bool) -> Status {
         let mut status = if edge { Status::EDGE } else { Status::GOOD };

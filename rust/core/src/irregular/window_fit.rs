@@ -3,24 +3,21 @@
 //! The choice of the order, the derivatives near the ends and the standard errors are those of windows on a uniform grid
 //! ([`crate::local_polynomials`]); a window holds so many samples, or those of so many seconds.
 //!
-//! A QR decomposition says what a window's fit is. Nearly all windows have neighbours with whom they share a basis, which gives the same in a tenth to a
-//! hundredth of the time ([`crate::irregular::shared_windows`]).
+//! Nearly all windows have neighbours with whom they share a basis ([`crate::irregular::shared_windows`]). The others, and all where samples have weights,
+//! have polynomials of their own ([`crate::local_polynomials::weighted_windows`]), which take several times as long.
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
 
 use crate::error::Error;
 use crate::exec::pool::{Piece, Watch, run};
-use crate::irregular::order_sums::OrderSums;
-use crate::irregular::order_table::{NEGLIGIBLE, OrderTable};
-use crate::irregular::own_basis::{OwnBasis, dot};
 use crate::irregular::shared_buffers::GroupSamples;
 use crate::irregular::shared_windows::{WindowsAbreast, can_share};
+use crate::irregular::window_alone::AloneMemory;
 use crate::irregular::window_estimates::{WindowFit, WindowFits};
-use crate::irregular::window_places::{Numbered, OwnWindow, PlacedWindow, WindowSpan, groups};
+use crate::irregular::window_places::{Numbered, PlacedWindow, WindowSpan, groups};
 use crate::local_polynomials::options::Order;
-use crate::local_polynomials::sliding_projection::ROUNDING;
-use crate::record::samples::is_usable;
+use crate::local_polynomials::order_table::OrderTable;
 use crate::simd::instructions::Instructions;
 use crate::simd::vectors::dispatch;
 
@@ -37,21 +34,10 @@ pub const FEWEST: usize = 5;
 /// Memory of one thread.
 #[derive(Debug, Default)]
 struct FitMemory {
-    basis: OwnBasis,
+    alone: AloneMemory,
     shared: GroupSamples,
     /// By length of the window.
     tables: Vec<Option<Box<OrderTable>>>,
-}
-
-/// One window's polynomials.
-struct FittedWindow {
-    coefficients: Vec<f64>,
-    /// Residual sum of squares of every order, and what rounding or quantisation leaves of it at least.
-    residuals: Vec<f64>,
-    floor: f64,
-    reference: f64,
-    /// Root of the weight that residuals are those of.
-    unit: f64,
 }
 
 impl WindowFit {
@@ -111,7 +97,10 @@ impl WindowFit {
         let windows = numbered.first..numbered.first + fits.order.len();
         let placed = self.span.places(&self.times, windows, numbered.step);
         let done = self.side_by_side(record, &placed, numbered, instructions, memory, &mut fits);
-        self.one_by_one(record, &placed, numbered, &done, &mut memory.basis, &mut fits);
+        let FitMemory { alone, tables, .. } = memory;
+        let table = |length: usize| tables[length].as_deref().expect("made for every window");
+        let passes = [(instructions, false), (instructions, true)];
+        self.apart(record, &placed, numbered, (&done, &passes), (&table, alone), &mut fits);
     }
 
     /// Fits the windows that share a basis and lose nothing by it; returns which do.
@@ -124,14 +113,8 @@ impl WindowFit {
         memory: &mut FitMemory,
         fits: &mut WindowFits<'_>,
     ) -> Vec<bool> {
+        memory.make_tables(self.order, placed);
         let FitMemory { shared, tables, .. } = memory;
-        for same in placed.chunk_by(|one, other| one.samples.len() == other.samples.len()) {
-            let length = same[0].samples.len();
-            if length >= tables.len() {
-                tables.resize(length + 1, None);
-            }
-            tables[length].get_or_insert_with(|| Box::new(OrderTable::new(self.order, length)));
-        }
         let table = |length: usize| tables[length].as_deref().expect("made for every window");
         let degrees = |length: usize| {
             let degrees = table(length).degrees;
@@ -155,127 +138,18 @@ impl WindowFit {
         dispatch(instructions, kernel);
         done
     }
+}
 
-    /// Fits the windows that are not done, each by a QR decomposition of its own.
-    fn one_by_one(
-        &self,
-        record: &[f64],
-        placed: &[PlacedWindow],
-        numbered: Numbered,
-        done: &[bool],
-        basis: &mut OwnBasis,
-        fits: &mut WindowFits<'_>,
-    ) {
-        let mut last: Option<(OwnWindow<'_>, Option<FittedWindow>)> = None;
-        for (place, window) in placed.iter().enumerate().filter(|(place, _)| !done[*place]) {
-            let sample = numbered.sample(place);
-            let own = self.span.own(&self.times, sample, window);
-            // Near the ends many samples have the same window.
-            let fitted = match &last {
-                Some((before, fitted)) if *before == own => fitted,
-                _ => &last.insert((own, self.fitted(record, own, basis))).1,
-            };
-            match fitted {
-                Some(fitted) => self.one(own, fitted, sample, basis, fits, place),
-                None => fits.invalidate(place),
+impl FitMemory {
+    /// Makes the tables of windows.
+    fn make_tables(&mut self, order: Order, placed: &[PlacedWindow]) {
+        for same in placed.chunk_by(|one, other| one.samples.len() == other.samples.len()) {
+            let length = same[0].samples.len();
+            if length >= self.tables.len() {
+                self.tables.resize(length + 1, None);
             }
+            self.tables[length].get_or_insert_with(|| Box::new(OrderTable::new(order, length)));
         }
-    }
-
-    /// The criterion of every candidate order in the window around a sample; NaN where it cannot be fitted.
-    #[must_use]
-    pub fn scores(&self, record: &[f64], sample: usize) -> Vec<f64> {
-        let mut basis = OwnBasis::default();
-        let window = self.span.around(&self.times, sample);
-        let own = self.span.own(&self.times, sample, &window);
-        let Order::Chosen { criterion, highest } = self.order else { return vec![f64::NAN] };
-        let score = |fitted: FittedWindow| {
-            let length = window.samples.len();
-            let of = |(order, residual): (usize, &f64)| criterion.score(residual.max(fitted.floor), order, length);
-            fitted.residuals.iter().enumerate().map(of).collect()
-        };
-        self.fitted(record, own, &mut basis).map_or_else(|| vec![f64::NAN; highest + 1], score)
-    }
-
-    /// Fits all candidates to a window, or `None` where it holds an unusable sample or too few.
-    fn fitted(&self, record: &[f64], window: OwnWindow<'_>, basis: &mut OwnBasis) -> Option<FittedWindow> {
-        let range = window.placed.samples.clone();
-        let (samples, length) = (&record[range.clone()], range.len());
-        let candidates = OrderTable::new(self.order, length).degrees;
-        if length < self.least || candidates == 0 || !samples.iter().all(|&value| is_usable(value)) {
-            return None;
-        }
-        let (unit, roots) = self.roots_of_weights(range.clone());
-        let times: Vec<f64> = self.times[range].iter().map(|time| (time - window.middle) / window.half).collect();
-        basis.make(&times, roots.as_deref(), candidates);
-        let reference = samples[length / 2];
-        let mut left: Vec<f64> = samples.iter().map(|value| value - reference).collect();
-        if let Some(roots) = &roots {
-            left.iter_mut().zip(roots).for_each(|(value, root)| *value *= root);
-        }
-        let energy = dot(&left, &left);
-        let coefficients = basis.project(&mut left);
-        if roots.is_some() && matches!(self.order, Order::Fixed(order) if order >= coefficients.len()) {
-            return None;
-        }
-        let mut residuals = vec![dot(&left, &left); coefficients.len()];
-        for order in (0..coefficients.len() - 1).rev() {
-            residuals[order] = residuals[order + 1] + coefficients[order + 1].powi(2);
-        }
-        let count = roots.as_ref().map_or(length as f64, |roots| dot(roots, roots));
-        let floor = (count * self.quantisation * self.quantisation / 12.0).max(ROUNDING * energy);
-        Some(FittedWindow { coefficients, residuals, floor, reference, unit })
-    }
-
-    /// Writes the estimates of a window that was fitted alone, whose basis is the last that was made.
-    fn one(
-        &self,
-        window: OwnWindow<'_>,
-        fitted: &FittedWindow,
-        sample: usize,
-        basis: &OwnBasis,
-        fits: &mut WindowFits<'_>,
-        place: usize,
-    ) {
-        let (edge, length, degrees) = (window.placed.edge, window.placed.samples.len(), fitted.coefficients.len());
-        let variance = |order: usize| {
-            let free = length - order - 1;
-            if free == 0 { f64::NAN } else { fitted.residuals[order].max(fitted.floor) / free as f64 }
-        };
-        let (order, shares) = match self.order {
-            Order::Fixed(order) => (order.min(degrees - 1), None),
-            Order::Chosen { criterion, .. } => {
-                let weight = |order: usize| fitted.residuals[order].max(fitted.floor) * criterion.weight(order, length);
-                let best = (0..degrees).fold(0, |best, one| if weight(one) < weight(best) { one } else { best });
-                let least = weight(best).max(f64::MIN_POSITIVE);
-                let share = |order: usize| {
-                    let above = length as f64 * (weight(order).max(f64::MIN_POSITIVE) / least).ln();
-                    if above < NEGLIGIBLE { (-above / 2.0).exp() } else { 0.0 }
-                };
-                (best, Some((0..degrees).map(share).collect::<Vec<f64>>()))
-            }
-        };
-        let polynomials = basis.at((self.times[sample] - window.middle) / window.half, self.derivatives);
-        for (derivative, polynomials) in polynomials.iter().enumerate() {
-            let scale = window.half.powi(-i32::try_from(derivative).unwrap_or(i32::MAX));
-            let level = if derivative == 0 { fitted.reference } else { 0.0 };
-            let sums = OrderSums::new(polynomials, &fitted.coefficients);
-            let taken = match shares {
-                Some(_) if edge => sums.best(order, derivative, variance(order)),
-                _ => order,
-            };
-            fits.derivatives[derivative][place] = level + sums.values[taken] * scale;
-            let Some(errors) = fits.errors.get_mut(derivative) else { continue };
-            let error = match &shares {
-                Some(shares) if !edge => sums.error(taken, shares, variance),
-                _ => (variance(order) * sums.gains[taken]).sqrt(),
-            };
-            errors[place] = error * scale;
-        }
-        let exact = fitted.residuals[order] <= fitted.floor;
-        fits.order[place] = u8::try_from(order).unwrap_or(u8::MAX);
-        fits.status[place] = self.status(order, degrees, edge, exact).bits();
-        fits.sigma[place] = variance(order).sqrt() * fitted.unit;
     }
 }
 
@@ -359,12 +233,21 @@ mod tests {
     /// Which samples the windows of a whole record are around.
     const EVERY: Numbered = Numbered { first: 0, step: 1 };
 
+    /// Fits windows by polynomials of their own, made orthogonal twice: what a QR decomposition finds.
+    fn alone(fit: &WindowFit, record: &[f64], (placed, done): (&[PlacedWindow], &[bool]), found: &mut FoundWindows) {
+        let mut memory = FitMemory::default();
+        memory.make_tables(fit.order, placed);
+        let FitMemory { alone, tables, .. } = &mut memory;
+        let table = |length: usize| tables[length].as_deref().expect("made for every window");
+        fit.apart(record, placed, EVERY, (done, &[(Instructions::Scalar, true)]), (&table, alone), &mut found.fits());
+    }
+
     /// What a QR decomposition of every so-many-th window finds; of others nothing is known.
     fn one_by_one(fit: &WindowFit, record: &[f64], every: usize) -> FoundWindows {
         let placed = fit.span.places(&fit.times, 0..record.len(), 1);
         let mut found = FoundWindows::new(fit.derivatives, placed.len());
         let skipped: Vec<bool> = (0..placed.len()).map(|window| window % every > 0).collect();
-        fit.one_by_one(record, &placed, EVERY, &skipped, &mut OwnBasis::default(), &mut found.fits());
+        alone(fit, record, (&placed, &skipped), &mut found);
         found
     }
 
@@ -441,7 +324,7 @@ mod tests {
                 let done = fit.side_by_side(&record, &placed, EVERY, instructions, &mut memory, &mut found.fits());
                 let missed = placed.iter().zip(&done).filter(|(window, done)| !window.edge && !**done).count();
                 assert!(missed * 50 < record.len(), "{missed} with {instructions:?}");
-                fit.one_by_one(&record, &placed, EVERY, &done, &mut OwnBasis::default(), &mut found.fits());
+                alone(&fit, &record, (&placed, &done), &mut found);
                 assert_same(&found, &expected, 0.0, &format!("{instructions:?}"));
             }
         }

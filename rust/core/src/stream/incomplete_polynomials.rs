@@ -7,7 +7,8 @@ use std::sync::Arc;
 
 use crate::error::Error;
 use crate::local_polynomials::estimates::Estimates;
-use crate::local_polynomials::incomplete::{Incomplete, IncompleteEstimate, parts_of};
+use crate::local_polynomials::incomplete::{IncompleteEstimate, IncompleteMemory};
+use crate::local_polynomials::incomplete_record::{Incomplete, parts_of};
 use crate::local_polynomials::plan::LocalPolynomials;
 use crate::record::derived::Cut;
 use crate::record::retained::Retained;
@@ -42,6 +43,7 @@ pub struct IncompleteStream {
     weights: Retained,
     /// Samples and weights around those that are given.
     around: [Vec<f64>; 2],
+    memory: IncompleteMemory,
 }
 
 /// What a stream of samples with weights resumes from.
@@ -73,7 +75,7 @@ impl IncompleteStream {
             stream = stream.with_neighbours(reach(&plan, gaps));
         }
         let weights = Retained::new(state.first_weight, state.weights);
-        Ok(Self { plan, stream, gaps, weights, around: Default::default() })
+        Ok(Self { plan, stream, gaps, weights, around: Default::default(), memory: IncompleteMemory::default() })
     }
 
     /// The state to resume from.
@@ -162,10 +164,12 @@ impl IncompleteStream {
         let weights = gaps.weighted.then_some(&weights[..]);
         let parts = parts_of(values, weights, gaps.longest_gap);
         let record = Incomplete { samples: values, weights, parts: &parts, least: gaps.least };
-        for element in elements {
-            if wanted(element, estimates.status) {
-                put(&self.plan.incomplete(&record, grid.sample(element) - first), element, estimates, errors);
-            }
+        let elements: Vec<usize> = elements.filter(|element| wanted(*element, estimates.status)).collect();
+        let places: Vec<usize> = elements.iter().map(|element| grid.sample(*element) - first).collect();
+        let mut found = vec![None; places.len()];
+        self.plan.fit_incomplete(&record, &places, &mut self.memory, &mut found, &|| true);
+        for (element, found) in elements.into_iter().zip(found.into_iter().flatten()) {
+            put(&found, element, estimates, errors);
         }
     }
 }

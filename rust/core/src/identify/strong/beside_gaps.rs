@@ -10,7 +10,8 @@ use crate::error::Error;
 use crate::exec::pool::GoOn;
 use crate::exec::stages::Stages;
 use crate::local_polynomials::estimates::Estimates;
-use crate::local_polynomials::incomplete::{Incomplete, IncompleteEstimate, parts_between_gaps};
+use crate::local_polynomials::incomplete::{IncompleteEstimate, IncompleteMemory};
+use crate::local_polynomials::incomplete_record::{Incomplete, parts_between_gaps};
 use crate::local_polynomials::plan::LocalPolynomials;
 use crate::record::samples::{Samples, all_usable, is_usable};
 use crate::status::Status;
@@ -104,6 +105,7 @@ fn flags_of(estimate: &IncompleteEstimate) -> u16 {
 pub(crate) struct BesideGaps {
     samples: Vec<f64>,
     weights: Vec<f64>,
+    memory: IncompleteMemory,
 }
 
 impl BesideGaps {
@@ -138,11 +140,10 @@ impl BesideGaps {
         };
         let lacking = Lacking::of(plan, samples, |place| wanted.contains(&(first + place)) && !is_spoilt(place));
         let record = lacking.record(plan, samples);
-        for &place in &lacking.places {
-            if !go_on() {
-                return;
-            }
-            let found = plan.incomplete(&record, place);
+        let mut found = vec![None; lacking.places.len()];
+        plan.fit_incomplete(&record, &lacking.places, &mut self.memory, &mut found, go_on);
+        for (place, found) in lacking.places.iter().zip(found) {
+            let Some(found) = found else { return };
             let element = first + place - wanted.start;
             for (column, (value, _)) in estimates.derivatives.iter_mut().zip(&found.derivatives) {
                 column[element] = *value;

@@ -1,0 +1,125 @@
+//! What windows of an incomplete record hold: the samples around some places, without those that are missing.
+
+use std::ops::Range;
+
+use crate::local_polynomials::incomplete_record::Incomplete;
+use crate::local_polynomials::weighted_samples::{WeightedSamples, unit_of};
+use crate::status::Status;
+
+/// A window that is to be fitted.
+#[derive(Clone, Debug)]
+pub(crate) struct HeldWindow {
+    /// The place that it is for, among those that are wanted.
+    pub(crate) number: usize,
+    /// Of the window's samples those in its part of the record, and the one that it is for.
+    inside: Range<usize>,
+    at: usize,
+    /// Where the first of them lies among those that are laid out.
+    laid: usize,
+    /// Samples that are there.
+    pub(crate) count: usize,
+    /// What is taken off all of them: the one in their middle.
+    pub(crate) reference: f64,
+    /// What weights are multiplied by: a power of two, so that no digit changes.
+    pub(crate) unit: f64,
+    pub(crate) flags: Status,
+}
+
+/// Samples around some places, laid out window after window; those that windows share lie there once.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct HeldSamples {
+    values: Vec<f64>,
+    /// 0 where a sample is missing.
+    weights: Vec<f64>,
+    /// How many samples are there before each, and where each of them lies.
+    before: Vec<usize>,
+    there: Vec<usize>,
+    /// Samples of the record that were laid out last, and where the first of them lies.
+    last: Range<usize>,
+    laid: usize,
+}
+
+impl HeldSamples {
+    /// Forgets all samples.
+    pub(crate) fn clear(&mut self) {
+        for list in [&mut self.values, &mut self.weights] {
+            list.clear();
+        }
+        for list in [&mut self.before, &mut self.there] {
+            list.clear();
+        }
+        self.before.push(0);
+        (self.last, self.laid) = (0..0, 0);
+    }
+
+    /// Lays out samples of a record; returns where the first lies. Those of the call before must not begin later.
+    fn lay(&mut self, record: &Incomplete<'_>, samples: Range<usize>) -> usize {
+        if samples.start > self.last.end || samples.start < self.last.start || self.last.is_empty() {
+            (self.last, self.laid) = (samples.start..samples.start, self.values.len());
+        }
+        for sample in self.last.end..samples.end {
+            let weight = record.weight(sample);
+            if weight > 0.0 {
+                self.there.push(self.values.len());
+            }
+            self.values.push(if weight > 0.0 { record.samples[sample] } else { 0.0 });
+            self.weights.push(weight);
+            self.before.push(self.there.len());
+        }
+        self.last.end = self.last.end.max(samples.end);
+        self.laid + samples.start - self.last.start
+    }
+
+    /// Lays out the window of a length around a place, with so many samples before that; or its flags where it holds too little.
+    pub(crate) fn window(
+        &mut self,
+        record: &Incomplete<'_>,
+        (number, place): (usize, usize),
+        (length, before): (usize, usize),
+    ) -> Result<HeldWindow, Status> {
+        let next = record.parts.partition_point(|part| part.end <= place);
+        let part = record.parts.get(next).filter(|part| part.contains(&place)).ok_or(Status::GAP)?;
+        // The window stays within its part, and the record, as it does near the ends of a record without gaps.
+        let last = part.end.saturating_sub(length).max(part.start).min(record.samples.len() - length);
+        let first = place.saturating_sub(before).clamp(part.start.min(last), last);
+        let there = first.max(part.start)..(first + length).min(part.end);
+        let mut flags = Status::GOOD;
+        if place - first != before {
+            flags |= Status::EDGE;
+        }
+        let laid = self.lay(record, there.clone());
+        let [from, to] = [laid, laid + there.len()].map(|at| self.before[at]);
+        let count = to - from;
+        if count < length {
+            flags |= Status::GAP;
+        }
+        if count < record.least.max(1) {
+            return Err(flags);
+        }
+        let middle = self.there[from + count / 2];
+        Ok(HeldWindow {
+            number,
+            inside: there.start - first..there.end - first,
+            at: place - first,
+            laid,
+            count,
+            reference: self.values[middle],
+            unit: unit_of(self.weights[middle]),
+            flags,
+        })
+    }
+
+    /// A window with the times of a whole one's samples.
+    pub(crate) fn own<'a>(&'a self, window: &HeldWindow, times: &'a [f64]) -> WeightedSamples<'a> {
+        let laid = window.laid..window.laid + window.inside.len();
+        WeightedSamples {
+            times: &times[window.inside.clone()],
+            weights: &self.weights[laid.clone()],
+            values: &self.values[laid],
+            reference: window.reference,
+            unit: window.unit,
+            at: times[window.at],
+            most: window.count,
+        }
+    }
+}
