@@ -84,6 +84,8 @@ def read_foreign(path: Path, say: Say) -> Channels:
         raise FileError(f"{kind.name} must be whole; its reader says: {printable(last['error'], 300)}; {kind.cure}")
     if last["skipped"]:
         say(f"not read: {listed(last['skipped'])}")
+    for remark in last["remarks"]:
+        say(printable(remark, 300))
     channels = _with_one_unit(channels, say)
     for text in texts:
         channels |= read_columns(io.StringIO(text), say)

@@ -13,7 +13,7 @@ import warnings
 from importlib import import_module
 from typing import IO, Any
 
-from tvident._formats.told import Sheet, cut, in_words
+from tvident._formats.told import Remark, Sheet, cut, in_words
 
 
 def main(module: str, path: str, most_bytes: str, most_seconds: str) -> None:
@@ -28,7 +28,9 @@ def main(module: str, path: str, most_bytes: str, most_seconds: str) -> None:
             _give(output, name, value, skipped)
     except BaseException as one:  # noqa: BLE001 - readers of foreign formats raise anything
         error = in_words(one)
-    _line(output, {"skipped": [cut(one) for one in skipped], "error": error})
+    names = [cut(one) for one in skipped if not isinstance(one, Remark)]
+    remarks = list(dict.fromkeys(cut(one) for one in skipped if isinstance(one, Remark)))
+    _line(output, {"skipped": names, "remarks": remarks, "error": error})
 
 
 def _limit(most_bytes: int, most_seconds: int) -> None:

@@ -33,12 +33,16 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
             except Exception as error:  # noqa: BLE001 - of one topic; the others may be whole
                 topic.failed = in_words(error)
     groups = []
+    read = [topic for topic in collected.values() if topic.columns and not topic.failed]
+    # Topics that began later have later times.
+    first = min((stamps[0] for topic in read for stamps, _ in topic.columns.values()), default=0)
     for topic in collected.values():
-        if topic.failed or not topic.columns:
-            skipped.append(f"{cut(topic.name)} ({topic.failed or 'no numbers'})")
+        if topic in read:
+            groups += topic.groups(first)
+            skipped += [f"{cut(topic.name)}.{cut(name)} ({why})" for name, why in topic.left_out.items()]
         else:
-            groups += topic.groups()
-    yield from named(groups)
+            skipped.append(f"{cut(topic.name)} ({topic.failed or 'no numbers'})")
+    yield from named(groups, skipped)
 
 
 class _Topic:
@@ -48,6 +52,8 @@ class _Topic:
         self.failed = ""
         self.columns: dict[str, tuple[list[int], list[float]]] = {}
         """Stamps in nanoseconds and values by name."""
+        self.left_out: dict[str, str] = {}
+        """Fields that are not read, and why."""
 
     def add(self, message: Any, received: int) -> None:
         stamp = getattr(getattr(message, "header", None), "stamp", None)
@@ -56,17 +62,16 @@ class _Topic:
             if stamp is None or not (stamp.sec or stamp.nanosec)
             else 10**9 * int(stamp.sec) + int(stamp.nanosec)
         )
-        for name, value in _of_joints(message) if self.is_joints else _numbers("", message):
+        for name, value in _of_joints(message) if self.is_joints else _numbers("", message, self.left_out):
             stamps, values = self.columns.setdefault(name, ([], []))
             stamps.append(at)
             values.append(value)
 
-    def groups(self) -> list[Group]:
+    def groups(self, first: int) -> list[Group]:
         """Return the columns that have the same stamps together: joints may come in messages of their own."""
         import numpy as np  # noqa: PLC0415 - within the limits
 
         found: dict[bytes, Group] = {}
-        first = min(stamps[0] for stamps, _ in self.columns.values())
         for name, (stamps, values) in self.columns.items():
             exact = np.asarray(stamps, dtype=np.int64)
             key = exact.tobytes()
@@ -78,13 +83,18 @@ class _Topic:
 
 
 def _of_joints(message: Any) -> Iterator[tuple[str, float]]:
+    """Give what is known of every joint, called by its number where it has no name, or another has the same."""
+    names: dict[str, int] = {}
+    for number, name in enumerate(message.name):
+        names.setdefault(name if name and name not in names else f"{name}{number}", number)
+    called = {number: name for name, number in names.items()}
     for quantity in _QUANTITIES:
-        for joint, value in zip(message.name, getattr(message, quantity), strict=False):
-            yield f"{joint}.{quantity}", float(value)
+        for number, value in enumerate(getattr(message, quantity)):
+            yield f"{called.get(number, f'joint{number}')}.{quantity}", float(value)
 
 
-def _numbers(prefix: str, message: Any) -> Iterator[tuple[str, float]]:
-    """Give the numbers of a message by the names of their fields."""
+def _numbers(prefix: str, message: Any, left_out: dict[str, str]) -> Iterator[tuple[str, float]]:
+    """Give the numbers of a message by the names of their fields, and note what holds more numbers than channels."""
     for field in getattr(message, "__dataclass_fields__", {}):
         if field.startswith("__") or field == "header":
             continue
@@ -92,6 +102,11 @@ def _numbers(prefix: str, message: Any) -> Iterator[tuple[str, float]]:
         if isinstance(value, bool | int | float):
             yield name, float(value)
         elif hasattr(value, "__dataclass_fields__"):
-            yield from _numbers(f"{name}.", value)
-        elif hasattr(value, "dtype") and value.dtype.kind in "biuf" and value.size <= _MOST_ELEMENTS:
-            yield from ((f"{name}.{index}", float(one)) for index, one in enumerate(value.reshape(-1)))
+            yield from _numbers(f"{name}.", value, left_out)
+        elif hasattr(value, "dtype") and value.dtype.kind in "biuf":
+            if value.size <= _MOST_ELEMENTS:
+                yield from ((f"{name}.{index}", float(one)) for index, one in enumerate(value.reshape(-1)))
+            else:
+                left_out[name] = f"{value.size} numbers in a message; {_MOST_ELEMENTS} are channels at most"
+        elif isinstance(value, list) and any(hasattr(one, "__dataclass_fields__") for one in value):
+            left_out[name] = "a list of messages"

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import logging
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
-from tvident._formats.groups import Group, named
-from tvident._formats.told import cut
+from tvident._formats.groups import TIME, Group, axis_of, named
+from tvident._formats.tdms_parts import Parts, parts_noted, parts_of
+from tvident._formats.told import Logged, Remark, cut, in_words
+from tvident._units import factor_between
 
 _UNITS = ("unit_string", "ni_unitdescription", "unit", "units", "y_unit_label", "unit_description")
 """Properties that hold a unit, in small letters."""
@@ -17,54 +20,143 @@ _UNSET = "1904-01-02"
 _SAME_START = 1e-3
 """Parts of a sample period that two starts may differ by and still be one."""
 
+_GOES_ON = 0.5
+"""Parts of a sample period that what was appended may begin beside the next sample and still go on."""
+
 
 def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     """Give every channel of numbers with its unit, and the times of those that know their sample period."""
     import numpy as np  # noqa: PLC0415 - within the limits
     from nptdms import TdmsFile  # noqa: PLC0415 - an extra
 
-    file = TdmsFile.read(path)
-    if file.file_status.incomplete_final_segment:
+    told = Logged()
+    logging.getLogger("nptdms").addHandler(told)
+    with parts_noted() as every:
+        file = TdmsFile.read(path)
+    if file.file_status.incomplete_final_segment or any("incomplete" in one for one in told.messages):
         skipped.append("what was cut off at the end of the file (channels may have different lengths)")
-    starts = [one.properties["wf_start_time"] for group in file.groups() for one in group.channels() if _has_start(one)]
+    channels = [(one, parts_of(every, one)) for group in file.groups() for one in group.channels()]
+    read = [(one, parts, _samples(one, parts, told, skipped)) for one, parts in channels]
+    starts = [start for one, parts, samples in read if samples is not None for _, start in _starts(parts)]
+    starts += [
+        samples[0] for _, _, samples in read if samples is not None and samples.dtype.kind == "M" and samples.size
+    ]
     groups: list[Group] = []
-    for group in file.groups():
-        for channel in group.channels():
-            samples, properties = channel[:], channel.properties
-            if samples.dtype.kind == "M":
-                unit, samples = (
-                    "s",
-                    (samples - samples[0]) / np.timedelta64(1, "s") if samples.size else samples.astype(float),
-                )
-            elif samples.dtype.kind not in "biuf":
-                skipped.append(f"{cut(channel.name)} (no numbers)")
-                continue
-            else:
-                unit = _unit(properties)
-            period, first = properties.get("wf_increment"), properties.get("wf_start_offset", 0.0)
-            time = None
-            if period and samples.size:
-                later = (
-                    (properties["wf_start_time"] - min(starts)) / np.timedelta64(1, "s") if _has_start(channel) else 0.0
-                )
-                later = later if later > _SAME_START * period else 0.0
-                time = float(first) + later + float(period) * np.arange(samples.size)
-            part = Group(group.name, time, [(channel.name, unit, samples)])
-            before = next((one for one in groups if one.name == group.name and _same(one.time, time)), None)
-            if before is None:
-                groups.append(part)
-            else:
-                before.channels += part.channels
-    yield from named(groups)
+    for channel, parts, samples in read:
+        if samples is None:
+            continue
+        time, axis, unit, taken = None, TIME, _unit(channel.properties), samples
+        if samples.dtype.kind == "M":
+            unit = "s"
+            taken = (samples - min(starts)) / np.timedelta64(1, "s") if samples.size else samples.astype(float)
+        elif samples.size:
+            time, axis = _times(channel, samples.size, _starts(parts), starts, skipped)
+        part = Group(channel.group_name, time, [(channel.name, unit, taken)], axis)
+        before = next(
+            (one for one in groups if one.name == part.name and one.axis == axis and _same(one.time, time)), None
+        )
+        if before is None:
+            groups.append(part)
+        else:
+            before.channels += part.channels
+    yield from named(groups, skipped)
 
 
-def _has_start(channel: Any) -> bool:
+def _samples(channel: Any, parts: Parts, told: Logged, skipped: list[str]) -> Any:
+    """Return the samples of a channel; None where they cannot be read as they are meant, which is said."""
+    changed = _changed(parts)
+    if changed:
+        skipped.append(f"{cut(channel.name)} ({changed}; read the parts one by one)")
+        return None
+    told.messages.clear()
+    try:
+        samples = channel[:]
+    except Exception as error:  # noqa: BLE001 - of one channel; the others may be whole
+        skipped.append(f"{cut(channel.name)} ({in_words(error)})")
+        return None
+    if told.messages:
+        # Raw numbers come back where nothing knows how to scale them.
+        skipped.append(f"{cut(channel.name)} ({cut(told.messages[0])})")
+    elif samples.dtype.kind in "biufM":
+        return samples
+    else:
+        skipped.append(f"{cut(channel.name)} ({'complex' if samples.dtype.kind == 'c' else 'no numbers'})")
+    return None
+
+
+def _changed(parts: Parts) -> str:
+    """Return what of the parts of a channel is not the same in all, so that they are not one channel; empty where all are one."""
+    kinds: tuple[tuple[str, Callable[[Mapping[str, Any]], Any]], ...] = (
+        ("unit", _unit),
+        ("sample period", lambda properties: properties.get("wf_increment")),
+        (
+            "scaling",
+            lambda properties: {name: value for name, value in properties.items() if name.startswith("NI_Scale[")},
+        ),
+    )
+    for what, of in kinds:
+        # What was written later may have been known later.
+        said = [value for value in (of(properties) for _, properties in parts) if value]
+        other = next((value for value in said if str(value) != str(said[0])), None)
+        if other is not None:
+            shown = f": {said[0]}, then {other}" if isinstance(other, str | float) else ""
+            return f"it was appended to with another {what}{shown}"
+    return ""
+
+
+def _starts(parts: Parts) -> list[tuple[int, Any]]:
+    """Return the numbers of samples, and when they were taken, where the file says so: the first, and what was appended."""
+    found: list[tuple[int, Any]] = []
+    for first, properties in parts:
+        if _has_start(properties) and (not found or properties["wf_start_time"] != found[-1][1]):
+            found.append((first, properties["wf_start_time"]))
+    return found
+
+
+def _times(
+    channel: Any, samples: int, begun: Sequence[tuple[int, Any]], starts: Sequence[Any], skipped: list[str]
+) -> tuple[Any, tuple[str, str]]:
+    """Return the times of a channel, or what else its samples lie at, with name and unit; None where the file does not say."""
     import numpy as np  # noqa: PLC0415 - within the limits
 
-    start = channel.properties.get("wf_start_time")
+    properties = channel.properties
+    period = properties.get("wf_increment")
+    if period is None:
+        return None, TIME
+    axis = axis_of(str(properties.get("wf_xname") or ""), str(properties.get("wf_xunit_string") or ""))
+    if not 0 < float(period) < np.inf:
+        skipped.append(
+            Remark(f"channel {cut(channel.name)}: its sample period is {float(period):g}, so it has no times")
+        )
+        return None, TIME
+    period = float(period)
+    time = float(properties.get("wf_start_offset", 0.0)) + period * np.arange(samples)
+    if axis[0] != TIME[0] or not begun:
+        return time, axis
+    second = 1 / factor_between(axis[1], "s", name="time")
+    later = [(first, second * float((start - min(starts)) / np.timedelta64(1, "s"))) for first, start in begun]
+    before, moved = later[0]
+    time += moved if moved > _SAME_START * period else 0.0
+    for first, start in later[1:]:
+        pause = start - moved - period * (first - before)
+        if abs(pause) > _GOES_ON * period:
+            time[first:] += pause
+            skipped.append(
+                Remark(
+                    f"channel {cut(channel.name)}: it was appended to {pause / second:.6g} s after its end, as its times say"
+                )
+            )
+            before, moved = first, start
+    return time, axis
+
+
+def _has_start(properties: Mapping[str, Any]) -> bool:
+    import numpy as np  # noqa: PLC0415 - within the limits
+
+    start = properties.get("wf_start_time")
     # Text is no time, and the first instant of 1904 stands for none.
     is_set = isinstance(start, np.datetime64) and bool(start >= np.datetime64(_UNSET))
-    return is_set and bool(channel.properties.get("wf_increment"))
+    return is_set and bool(properties.get("wf_increment"))
 
 
 def _unit(properties: Mapping[str, Any]) -> str:

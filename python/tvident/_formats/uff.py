@@ -5,14 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from tvident._formats.groups import Group, named
-from tvident._formats.told import cut
+from tvident._formats.groups import TIME, Group, axis_of, named
+from tvident._formats.told import Remark, cut, in_words
 
 _FUNCTION, _TIME_RESPONSE = 58, 1
 _LAST_LINE = 200
 """Bytes that hold the last line, and blanks behind it."""
 
-_DIRECTIONS = {1: "+x", -1: "-x", 2: "+y", -2: "-y", 3: "+z", -3: "-z"}
+_DIRECTIONS = {
+    sign * (3 * turns + place): f"{'+' if sign > 0 else '-'}{'r' * turns}{letter}"
+    for sign in (1, -1)
+    for turns in (0, 1)
+    for place, letter in enumerate("xyz", start=1)
+}
+"""Translations along axes, and rotations about them."""
+
+_UNKNOWN, _TIME = 0, 17
+"""What an abscissa is."""
 
 
 def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
@@ -33,18 +42,41 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
         if kind != _FUNCTION:
             skipped.append(f"dataset {index} (of type {kind})")
             continue
-        one = file.read_sets(index)
-        name = _name(one, index)
-        if int(one.get("func_type", _TIME_RESPONSE)) not in {0, _TIME_RESPONSE} or np.iscomplexobj(one["data"]):
+        try:
+            one = file.read_sets(index)
+        except Exception as error:  # noqa: BLE001 - of one dataset; the others may be whole
+            skipped.append(f"dataset {index} ({in_words(error)})")
+            continue
+        name, axis = _name(one, index), _axis(one)
+        is_of_time = int(one.get("func_type", _TIME_RESPONSE)) in {0, _TIME_RESPONSE} and axis[0] == TIME[0]
+        if not is_of_time or np.iscomplexobj(one["data"]):
             skipped.append(f"{cut(name)} (no function of time)")
             continue
+        samples = np.asarray(one["data"])
+        times: Any = np.asarray(one["x"])
+        # The library takes what it finds up to the next mark.
+        count = int(one.get("num_pts") or samples.size)
+        if samples.size < count:
+            skipped.append(f"{cut(name)} (it holds {samples.size} of {count} samples: it is damaged)")
+            continue
+        if not (np.diff(times[:2]) > 0).all():
+            skipped.append(Remark(f"channel {cut(name)}: its times do not increase, so it has none"))
+            times = None
         unit = str(one.get("ordinate_axis_units_lab") or "").strip()
+        unit = "" if unit.upper() == "NONE" else unit
         groups.append(
-            Group(
-                f"set{index}", np.asarray(one["x"]), [(name, "" if unit == "NONE" else unit, np.asarray(one["data"]))]
-            )
+            Group(f"set{index}", None if times is None else times[:count], [(name, unit, samples[:count])], axis)
         )
-    yield from named(groups)
+    yield from named(groups, skipped)
+
+
+def _axis(one: Any) -> tuple[str, str]:
+    """Return name and unit of the abscissa: general functions may be of a frequency, or of anything."""
+    label, unit = (str(one.get(f"abscissa_axis{of}_lab") or "").strip() for of in ("", "_units"))
+    unit = "" if unit.upper() == "NONE" else unit
+    if int(one.get("abscissa_spec_data_type") or _UNKNOWN) == _TIME:
+        return axis_of("", unit)
+    return axis_of("" if label.upper() == "NONE" else label, unit)
 
 
 def _name(one: Any, index: int) -> str:
