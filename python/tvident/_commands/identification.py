@@ -16,6 +16,7 @@ from tvident._commands.equation import lag_of, parameter_of, terms_of
 from tvident._commands.given import check_time, given, period_of, wanted_progress
 from tvident._commands.method import NAMES, method_of
 from tvident._commands.output import RECORDING
+from tvident._commands.own_clocks import check_own_clocks
 from tvident._commands.rates import say_other_rate
 from tvident._commands.scales import scaled
 from tvident._commands.settings import read_settings
@@ -74,6 +75,7 @@ def identified(
     turn = None if period is None else scaled(np.asarray(period_of(period)), angle_scale, channels, file)
     motion = {"angle": angle, "velocity": velocity, "acceleration": acceleration}
     named = {name: channel for name, channel in motion.items() if channel is not None}
+    check_own_clocks(channels, [*named.values(), torque], time_channel, torque_time, file)
     recorded = [source_of(channels, name, file) for name in (*named.values(), torque)]
     times = times_of(channels, time_channel, next(iter(named.values())), file)
     signals = dict(zip(named, recorded, strict=False))

@@ -1,0 +1,62 @@
+"""Clocks of channels in files that say by which clock each channel was sampled: one for both would be a lag that nobody hears of."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from tvident import recordings
+from tvident._files import ending_of, full_name, printable
+from tvident._units import named_unit
+
+_GROUPED = frozenset((".tdms", ".mf4", ".mdf", ".uff", ".unv", ".c3d", ".xdf", ".xdfz", ".mcap", ".db3", ".bag"))
+"""Files in which times stand before the channels that were sampled at them."""
+
+_TIME = re.compile(r"time(_[0-9]+)?")
+
+
+def check_own_clocks(
+    channels: recordings.Channels, names: Sequence[str], time: str | None, torque_time: str | None, file: str | None
+) -> None:
+    """Refuse the clock of one channel for another that has a clock of its own, and say how to give both; warn beside a sample rate."""
+    if torque_time is not None or file is None or ending_of(Path(file)).lower() not in _GROUPED:
+        return
+    try:
+        clocks = [_clock_of(channels, full_name(channels, name, file)) for name in names]
+    except KeyError:
+        return  # of another file
+    if None in clocks or len(clocks) < 2 or _are_one(channels, clocks):  # noqa: PLR2004 - a motion and a torque
+        return
+    first, last = (printable(named_unit(str(one))[0]) for one in (clocks[0], clocks[-1]))
+    cure = f"--time {shlex.quote(first)} --torque-time {shlex.quote(last)}"
+    if time is not None:
+        raise click.UsageError(
+            f"angle and torque must have the times at which each was sampled; {printable(file)} has {first} and {last}, and got "
+            f"--time {printable(time)} for both; give {cure}, or the same for both if they do have one clock"
+        )
+    where = f"{printable(file)}: angle and torque have clocks of their own, {first} and {last}"
+    click.echo(f"Warning: {where}; a sample rate takes their first samples as of one time; give {cure}", err=True)
+
+
+def _clock_of(channels: recordings.Channels, name: str) -> str | None:
+    """Return the times that a channel was sampled at, by their name in the file; None where it has none."""
+    clock = None
+    group = named_unit(name)[0]
+    for one, values in channels.items():
+        prefix, _, bare = named_unit(one)[0].rpartition(".")
+        if _TIME.fullmatch(bare) and group.startswith(prefix):
+            clock = one
+        if one == name:
+            return clock if clock != one and clock is not None and channels[clock].shape == values.shape else None
+    return None
+
+
+def _are_one(channels: recordings.Channels, clocks: Sequence[Any]) -> bool:
+    first, last = (channels[one] for one in (clocks[0], clocks[-1]))
+    return clocks[0] == clocks[-1] or np.array_equal(first, last)

@@ -1,0 +1,49 @@
+"""One clock for two channels that have clocks of their own, as their file says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from nptdms import ChannelObject, TdmsWriter
+
+import tvident
+from commands import run
+
+LATE = 40
+"""Samples."""
+
+
+@pytest.fixture
+def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    made = tvident.simulate_torsional_rig(duration=3.0)
+    start = np.datetime64("2024-01-01T10:00:00.5")
+    later = start + np.timedelta64(LATE, "ms")
+    common = {"wf_increment": 1e-3, "wf_start_offset": 0.0}
+    with TdmsWriter("rig.tdms") as writer:
+        writer.write_segment(
+            [
+                ChannelObject(
+                    "rig", "angle", made.angle[:-LATE], {**common, "wf_start_time": start, "unit_string": "rad"}
+                ),
+                ChannelObject("rig", "torque", made.torque[LATE:], {**common, "wf_start_time": later, "units": "N m"}),
+                ChannelObject(
+                    "rig", "together", made.torque[:-LATE], {**common, "wf_start_time": start, "units": "N m"}
+                ),
+            ]
+        )
+
+
+@pytest.mark.usefixtures("rig")
+def test_one_clock_for_two_is_refused() -> None:
+    """A torque that began 40 ms after the angle was taken as of the same times, without a word."""
+    command = ["identify", "rig.tdms", "--angle", "angle", "--torque", "torque", "--method", "weak", "--step", "100"]
+    refused = run(*command, "--time", "rig.time")
+    assert refused.returncode == 2
+    assert "give --time rig.time --torque-time rig.time_2, or the same for both" in refused.stderr
+    assert "inertia" in run(*command, "--time", "rig.time", "--torque-time", "rig.time_2").stdout
+    assert "clocks of their own" in run(*command, "--sample-rate", "1000").stderr
+    alike = ["together" if one == "torque" else one for one in command]
+    assert "clocks of their own" not in run(*alike, "--time", "rig.time").stderr
