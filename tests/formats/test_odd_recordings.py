@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import ezc3d
+import h5py
 import numpy as np
 import pytest
 import pyuff
+import zarr
 from asammdf import MDF, Signal
 from nptdms import ChannelObject, TdmsWriter
 from rosbags.rosbag1 import Writer as Ros1Writer
@@ -302,3 +304,87 @@ def test_arrays_that_are_too_long_for_channels_are_named(tmp_path: Path) -> None
     layout = types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
     message = types["std_msgs/msg/Float64MultiArray"](layout=layout, data=np.zeros(100))
     assert "a.data (100 numbers in a message" in read(bag(tmp_path / "x.bag", [("/a", at, message) for at in T[:3]]))[1]
+
+
+MATRIX = np.stack([1e3 * T, ANGLE, TORQUE], axis=1)
+
+
+@pytest.mark.parametrize("is_across", [False, True])
+@pytest.mark.parametrize(
+    ("names", "units"),
+    [
+        (["time [ms]", "angle [deg]", "torque [N m]"], None),
+        ("time,angle,torque", "ms,deg,N m"),
+        (np.array(["time", "angle", "torque"], dtype="S"), ["ms", "deg", "N m"]),
+    ],
+)
+def test_columns_of_a_matrix_are_called_as_attributes_say(
+    tmp_path: Path, is_across: bool, names: Any, units: Any
+) -> None:
+    """They were data.0, data.1 and data.2, without units and without a word."""
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        made = file.create_dataset("run/data", data=MATRIX.T if is_across else MATRIX)
+        (file["run"] if is_across else made).attrs["column_names"] = names
+        if units is not None:
+            made.attrs["units"] = units
+    found, skipped, _ = read(tmp_path / "x.h5")
+    assert {name: one.unit for name, one in found.items()} == {
+        "run.data.time": "ms",
+        "run.data.angle": "deg",
+        "run.data.torque": "N m",
+    }
+    np.testing.assert_array_equal(found["angle"], ANGLE)
+    assert not skipped
+
+
+def test_a_list_beside_a_matrix_calls_its_columns(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        file["data"], file["labels"], file["units"] = MATRIX, ["time", "angle", "torque"], ["ms", "deg", "N m"]
+        file["notes"] = ["one", "two"]
+    found, skipped, _ = read(tmp_path / "x.h5")
+    assert ([one.unit for one in found.values()], skipped) == (["ms", "deg", "N m"], "notes (no numbers)")
+    with h5py.File(tmp_path / "y.h5", "w") as file:
+        file["data"] = MATRIX
+        file["data"].attrs["unit"] = "deg"  # of all
+        file["data"].attrs["columns"] = ["a", "b"]
+    assert {name: one.unit for name, one in read(tmp_path / "y.h5")[0].items()} == dict.fromkeys(
+        ("data.0", "data.1", "data.2"), "deg"
+    )
+
+
+def test_arrays_of_zarr_are_channels(tmp_path: Path) -> None:
+    """A folder called x.zarr was refused: "name a file in it"."""
+    group = zarr.open_group(str(tmp_path / "x.zarr"), mode="w")
+    for name, samples, unit in (("angle", ANGLE, "deg"), ("torque", TORQUE, "N m")):
+        made = group.require_group("rig").create_array(name, data=samples)
+        made.attrs["units"] = unit
+    group.attrs["fs"] = 250.0
+    group.create_array("data", data=MATRIX).attrs["columns"] = ["time", "angle", "torque"]
+    found = tvident.read_recording(tmp_path / "x.zarr")
+    assert found.units == {
+        "sample_rate": "Hz",
+        **dict.fromkeys(("data.time", "data.angle", "data.torque"), ""),
+        "rig.angle": "deg",
+        "rig.torque": "N m",
+    }
+    np.testing.assert_array_equal(found["rig.torque"], TORQUE)
+    assert found.sample_rate == 250
+
+
+def test_a_store_that_is_not_whole_says_so(tmp_path: Path) -> None:
+    group = zarr.open_group(str(tmp_path / "x.zarr"), mode="w")
+    for name in ("angle", "torque"):
+        group.create_array(name, data=ANGLE + 100, chunks=(100,))
+    first, second = (
+        min(one for one in (tmp_path / "x.zarr" / name).rglob("*") if one.is_file() and one.suffix != ".json")
+        for name in ("angle", "torque")
+    )
+    first.write_bytes(first.read_bytes()[:-20])
+    second.unlink()
+    found, skipped, remarks = read(tmp_path / "x.zarr")
+    assert list(found) == ["torque"]
+    assert skipped.startswith("angle (")
+    assert remarks.startswith("torque: 1 of 3 chunks are not in the store and were read as 0")
+    (tmp_path / "empty.zarr").mkdir()
+    with pytest.raises(recordings.FileError, match="must not be empty; this one has no bytes; copy it again"):
+        recordings.read(tmp_path / "empty.zarr")

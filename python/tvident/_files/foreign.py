@@ -41,11 +41,13 @@ def read_foreign(path: Path, say: Say) -> Channels:
     kind = FORMATS[path.suffix.lower()]
     if find_spec(kind.package) is None:
         raise FileError(f"{kind.name} needs {kind.package}; install it with: pip install 'tvident[{kind.extra}]'")
-    with path.open("rb"):
-        pass  # what may not be read says so in the same words as any other file
-    if not path.stat().st_size:
+    files = sorted(one for one in path.rglob("*") if one.is_file()) if path.is_dir() else [path]
+    for one in files:
+        with one.open("rb"):
+            pass  # what may not be read says so in the same words as any other file
+    size = sum(one.stat().st_size for one in files)
+    if not size:
         raise FileError(f"{kind.name} must not be empty; this one has no bytes; {kind.cure}")
-    size = path.stat().st_size
     seconds = kind.slowness * (_SECONDS + size // _BYTES_A_SECOND)
     limits = (str(_BYTES + _BYTES_FOR_EACH * size), str(seconds))
     # -P: the folder of the reader is no place to import from; the rest is found where this process finds it.

@@ -15,7 +15,7 @@ from tvident._files.channels import Channels, FileError, FileWarning, Say
 from tvident._files.names import printable
 from tvident._files.no_values import marks_given, said_of_marks, without_marks
 from tvident._files.unpacked import ending_of
-from tvident._formats import FORMATS
+from tvident._formats import FOLDERS, FORMATS
 
 PLAIN = (".csv", ".txt", ".tsv", ".dat", ".asc")
 TEXT, NUMPY = (*PLAIN, ".lvm", ".mot", ".sto"), (".npy", ".npz")
@@ -55,9 +55,10 @@ def check_readable(path: Path, endings: Iterable[str]) -> None:
         raise FileError(f"{place}: may not be read; check its permissions") from None
     except (OSError, ValueError) as error:
         raise FileError(f"{place}: is no name of a file ({error.args[-1]}); check it") from None
-    if kind is not None and stat.S_ISDIR(kind):
-        raise FileError(f"{place}: this is a folder; name a file in it")
     ending = ending_of(path)
+    is_folder = kind is not None and stat.S_ISDIR(kind)
+    if is_folder and not (ending.lower() in FOLDERS and ending.lower() in endings):
+        raise FileError(f"{place}: this is a folder; name a file in it")
     if ending.lower() not in endings:
         known = ", ".join(endings)
         got = f"'{printable(ending)}'" if ending else "none"
@@ -66,7 +67,7 @@ def check_readable(path: Path, endings: Iterable[str]) -> None:
         )
     if kind is None:
         raise FileError(f"{place}: there is no such file; check the name and the folder")
-    if not stat.S_ISREG(kind):
+    if not stat.S_ISREG(kind) and not is_folder:
         raise FileError(f"{place}: must be a file; it is a pipe or a device; save what it gives in a file first")
 
 
@@ -76,8 +77,8 @@ def read(path: str | Path, *, missing: float | Sequence[float] = ()) -> Channels
     Parameters
     ----------
     path : str or Path
-        A text file of columns, an NPY or NPZ file, or with an extra: Parquet, HDF5, MATLAB, TDMS, xlsx (``io``), MDF (``mdf``), universal
-        files (``uff``), C3D (``c3d``), XDF (``xdf``), ROS bags and MCAP (``ros``).
+        A text file of columns, an NPY or NPZ file, or with an extra: Parquet, HDF5, Zarr, MATLAB, TDMS, xlsx (``io``), MDF (``mdf``),
+        universal files (``uff``), C3D (``c3d``), XDF (``xdf``), ROS bags and MCAP (``ros``).
     missing : float or sequence of float, optional
         Numbers that mark values that are missing, as -9999: they become NaN. One that is far from all other values of a channel is asked
         for in a warning.

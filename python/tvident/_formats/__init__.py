@@ -1,5 +1,5 @@
 """Reads files of other programs with the libraries that know them, in a process of its own."""
 
-from tvident._formats.known import FORMATS, PROCESS, Format
+from tvident._formats.known import FOLDERS, FORMATS, PROCESS, Format
 
-__all__ = ["FORMATS", "PROCESS", "Format"]
+__all__ = ["FOLDERS", "FORMATS", "PROCESS", "Format"]

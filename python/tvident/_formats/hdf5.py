@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import Any
 
+from tvident._formats.columns import COLUMNS, UNITS, channels_of, first_of
 from tvident._formats.told import cut, in_words
 
-_UNITS = ("unit", "units", "Unit", "Units", "UNITS")
-_RATES = ("sample_rate", "sampling_rate", "fs", "Fs", "samplerate", "SampleRate")
+RATES = ("sample_rate", "sampling_rate", "fs", "Fs", "samplerate", "SampleRate")
+"""Attributes that hold a sample rate."""
 
 
 def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
@@ -18,11 +20,14 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
 
     with h5py.File(path, "r") as file:
         found = dict(_datasets(file, "", h5py))
-        rate = _text_or_number(file.attrs, _RATES)
+        rate = first_of(file.attrs, RATES)
         if rate is not None:
             yield "sample_rate [Hz]", np.float64(rate)
+        lists = dict(_lists(found))
         for name, dataset in found.items():
             bare = name.replace("/", ".")
+            if name in lists:
+                continue
             if dataset.dtype.kind not in "biufc" and not dataset.dtype.names:
                 skipped.append(f"{cut(bare)} (no numbers)")
                 continue
@@ -31,8 +36,9 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
             except Exception as error:  # noqa: BLE001 - of one dataset; the others may be whole
                 skipped.append(f"{cut(bare)} ({in_words(error)})")
                 continue
-            unit = _text_or_number(dataset.attrs, _UNITS)
-            yield (f"{bare} [{unit}]" if unit else bare), values
+            # A list of the columns may stand beside a matrix, as a dataset of its own.
+            beside = {one.rpartition("/")[2]: words for one, words in lists.items() if _is_beside(one, name)}
+            yield from channels_of(bare, values, [dataset.attrs, beside, dataset.parent.attrs, file.attrs])
 
 
 def _datasets(group: Any, prefix: str, h5py: Any) -> Iterator[tuple[str, Any]]:
@@ -46,11 +52,17 @@ def _datasets(group: Any, prefix: str, h5py: Any) -> Iterator[tuple[str, Any]]:
                 yield from _datasets(one, f"{prefix}{name}/", h5py)
 
 
-def _text_or_number(attributes: Any, names: tuple[str, ...]) -> Any:
-    """Return the first of these attributes that is there, as text or a number."""
-    for name in names:
-        if name in attributes:
-            value = attributes[name]
-            value = value.item() if hasattr(value, "item") and value.size == 1 else value
-            return value.decode(errors="replace") if isinstance(value, bytes) else value
-    return None
+def _lists(found: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Give datasets of words that are called as lists of columns or units are, and stand beside a matrix of as many columns or rows."""
+    for name, dataset in found.items():
+        bare = name.rpartition("/")[2]
+        is_list = dataset.dtype.kind in "OSU" and (COLUMNS.fullmatch(bare.lower()) or bare in UNITS)
+        if is_list and any(
+            _is_beside(name, other) and dataset.size in one.shape for other, one in found.items() if one.ndim > 1
+        ):
+            with suppress(Exception):  # what is damaged is no list
+                yield name, dataset[()]
+
+
+def _is_beside(name: str, other: str) -> bool:
+    return name.rpartition("/")[0] == other.rpartition("/")[0]

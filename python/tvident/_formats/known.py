@@ -43,6 +43,7 @@ _XLSX = Format("a workbook", "xlsx", "openpyxl", "io", "save it again, or export
 _MDF = Format("an MDF file", "mdf", "asammdf", "mdf", slowness=4)
 _UFF = Format("a universal file", "uff", "pyuff", "uff")
 _XDF = Format("an XDF file", "xdf", "pyxdf", "xdf")
+_ZARR = Format("a Zarr store", "zarr_arrays", "zarr", "io", slowness=2)
 _ROS = Format("a ROS bag", "ros", "rosbags", "ros")
 
 FORMATS = {
@@ -63,5 +64,9 @@ FORMATS = {
     ".mcap": _ROS,
     ".db3": _ROS,
     ".bag": _ROS,
+    ".zarr": _ZARR,
 }
 """Formats by the ending of their files."""
+
+FOLDERS = frozenset((".zarr",))
+"""Endings of what may be a folder of files."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from tvident._formats.columns import COLUMNS
 from tvident._formats.matlab_tables import has_objects, tables
 from tvident._formats.told import cut, in_words
 
@@ -28,10 +28,6 @@ _UNITS = ("unit", "units")
 """Fields of a structure that is one channel."""
 _NAMES = ("name", "names", "label", "channel", "channelname", "signalname", "title", "blockname")
 """Fields of an array of structures that call its channels; a scope of Simulink has a label, which may be empty, and a name of a block."""
-_COLUMNS = re.compile(
-    r"(col|column|chan|channel|signal|var|variable)?_?(names?|labels?|headers?|titles?)|channels|signals|columns"
-)
-"""What a list of the columns of a matrix beside it is called, as ``importdata`` has it in ``colheaders``."""
 _SHAPES = ("dimensions",)
 """What Simulink says beside the samples."""
 
@@ -105,7 +101,7 @@ def _flat(prefix: str, variables: Mapping[str, Any]) -> Iterator[tuple[str, Any]
 def _by_column(fields: Mapping[str, Any]) -> dict[str, Any]:
     """Return variables with the columns of matrices by name, where a list beside them calls as many as these have."""
     lists = {name: words for name, value in fields.items() if (words := _words(value))}
-    called = next((one for name, one in lists.items() if _COLUMNS.fullmatch(name.lower())), [])
+    called = next((one for name, one in lists.items() if COLUMNS.fullmatch(name.lower())), [])
     matrices = [name for name, value in fields.items() if len(called) > 1 and _has_columns(value, len(called))]
     if not matrices:
         return dict(fields)

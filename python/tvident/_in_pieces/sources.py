@@ -184,7 +184,10 @@ def _zarr(path: Path) -> Source:
         ) from None
     if isinstance(opened, zarr.Array):
         return _source(path, _of_arrays({"": opened}))
-    return _source(path, _of_arrays({name.replace("/", "."): one for name, one in opened.arrays()}))
+    members = opened.members(max_depth=None)
+    return _source(
+        path, _of_arrays({name.replace("/", "."): one for name, one in members if isinstance(one, zarr.Array)})
+    )
 
 
 def _of_arrays(found: Mapping[str, Any]) -> dict[str, tuple[SourceChannel, int]]:

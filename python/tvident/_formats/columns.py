@@ -1,0 +1,72 @@
+"""Names and units of the columns of a matrix, as attributes of it, or of what it is in, say them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+UNITS = ("unit", "units", "Unit", "Units", "UNITS")
+"""Attributes that hold a unit, or one for every column."""
+
+COLUMNS = re.compile(
+    r"(col|column|chan|channel|signal|var|variable)?_?(names?|labels?|headers?|titles?)|channels|signals|columns"
+)
+"""What a list of the columns of a matrix beside it is called, as ``importdata`` has it in ``colheaders``."""
+
+_BETWEEN = re.compile(r"[,;|\t\n]")
+
+
+def channels_of(name: str, array: Any, attributes: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, Any]]:
+    """Give an array, or the columns of a matrix, by names with units; attributes are its own, then those of what it is in."""
+    unit = next((one for each in attributes[:2] if (one := first_of(each, UNITS)) is not None), None)
+    if sum(length > 1 for length in array.shape) != 2:  # noqa: PLR2004 - rows and columns
+        yield _named(name, unit), array
+        return
+    matrix = array.reshape([length for length in array.shape if length > 1])
+    names = next((one for each in attributes if (one := _list_in(each, matrix.shape))), [])
+    count = len(names) or min(matrix.shape)
+    units = _words(unit)
+    if not names and not isinstance(unit, str) and len(units) != count:
+        yield name, array
+        return
+    columns = matrix.T if matrix.shape[-1] == count else matrix
+    of_columns = units if len(units) == count else [unit if isinstance(unit, str) else ""] * count
+    for place, samples in enumerate(columns):
+        own = names[place] if names else str(place)
+        yield _named(f"{name}.{own}" if name else own, of_columns[place]), samples
+
+
+def first_of(attributes: Mapping[str, Any], names: Sequence[str]) -> Any:
+    """Return the first of these attributes that is there, as text, a number, or an array."""
+    for name in names:
+        if name in attributes:
+            value = attributes[name]
+            value = value.item() if hasattr(value, "item") and value.size == 1 else value
+            return value.decode(errors="replace") if isinstance(value, bytes) else value
+    return None
+
+
+def _named(name: str, unit: Any) -> str:
+    return f"{name} [{unit}]" if isinstance(unit, str) and unit and name else name
+
+
+def _list_in(attributes: Mapping[str, Any], shape: Sequence[int]) -> list[str]:
+    """Return the names of as many columns, or rows, as a matrix has; nothing where the attributes say none."""
+    for key in attributes:
+        if COLUMNS.fullmatch(str(key).lower()):
+            found = _words(first_of(attributes, [key]))
+            if len(found) in shape and 1 < len(found) < max(shape) and all(found):
+                return found
+    return []
+
+
+def _words(value: Any) -> list[str]:
+    """Return the words of a list, or of a text that separates them; nothing where they are none."""
+    if isinstance(value, str):
+        return [one.strip() for one in _BETWEEN.split(value)]
+    cells = value.reshape(-1).tolist() if hasattr(value, "reshape") else value
+    if not isinstance(cells, list | tuple):
+        return []
+    plain = [one.decode(errors="replace") if isinstance(one, bytes) else one for one in cells]
+    return [one.strip() for one in plain] if all(isinstance(one, str) for one in plain) else []
