@@ -12,7 +12,8 @@ import pytest
 import tvident
 from commands import run
 from tvident import recordings
-from tvident._advice.marks import marks_that_stay
+from tvident._advice.marks import Numbers, marks_that_stay
+from tvident._arguments import marks_in
 
 RIG = tvident.simulate_torsional_rig(duration=3.0)
 
@@ -161,6 +162,110 @@ def test_a_torque_that_is_turned_on_and_off_is_no_mark(level: float) -> None:
     noise = 1e-3 * np.random.default_rng(1).standard_normal((2, number.size))
     is_on = number // 500 % 2 == 0
     torque = np.where(is_on, level, noise[0])
-    assert marks_that_stay({"torque": torque}, {"torque": 1.0}, 1e-3) == []
+    assert marks_that_stay([Numbers("torque", torque)], 1e-3) == []
     for missing in (np.where(is_on, -level, noise[0]), np.where(number // 500 == 3, level, noise[0])):
-        assert len(marks_that_stay({"torque": missing}, {"torque": 1.0}, 1e-3)) == 1
+        assert len(marks_that_stay([Numbers("torque", missing)], 1e-3)) == 1
+
+
+NOISE = np.random.default_rng(4).standard_normal(RIG.angle.size)
+
+
+@pytest.mark.parametrize(
+    ("marks", "found"),
+    [
+        ((9999.0, -9999.0), (-9999.0, 9999.0)),
+        ((-999.25, 1e20), (-999.25, 1e20)),
+        ((32767.0, -32768.0), (-32768.0, 32767.0)),
+    ],
+)
+def test_marks_of_both_signs_are_asked_for(tmp_path: Path, marks: tuple[float, ...], found: tuple[float, ...]) -> None:
+    """Neither was far from all others, of which the other was one."""
+    values = NOISE.copy()
+    values[100:110], values[300:330] = marks
+    assert [one for one, _ in marks_in(values)] == list(found)
+    np.savez(tmp_path / "x.npz", a=values)
+    with pytest.warns(recordings.FileWarning) as said:
+        recordings.read(tmp_path / "x.npz")
+    assert len(said) == 2
+    np.testing.assert_array_equal(np.isnan(recordings.read(tmp_path / "x.npz", missing=marks)["a"]).sum(), 40)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        np.tile([-32768.0, 0.0, 32767.0], 100),  # a converter of three levels
+        np.where(np.arange(300) < 10, 32768.0, 33000 + 20 * NOISE[:300]),  # binary with an offset, at rest first
+        np.where(np.arange(300) < 10, 65535.0, 65000 + 20 * NOISE[:300]),
+        np.tile([0.0, 9999.0, 5.0], 100),
+    ],
+)
+def test_levels_and_offsets_are_no_marks(values: np.ndarray) -> None:
+    assert marks_in(values) == []
+
+
+def test_an_encoder_that_wraps_stands_anywhere_within_a_turn() -> None:
+    """Counts of an encoder are 0 to 65535, so 65535 beside 0 to 8 marks nothing where period= says that it wraps."""
+    counts = (np.round(4.6 * np.sin(9 * RIG.time)) + 4) % 65536
+    assert marks_that_stay([Numbers("angle", counts)], 1e-3)
+    assert marks_that_stay([Numbers("angle", counts, turn=65536.0)], 1e-3) == []
+
+
+@pytest.mark.parametrize("channel", ["angle", "torque"])
+@pytest.mark.parametrize("pattern", ["second", "third", "tenth", "random"])
+def test_marks_among_samples_are_not_trusted(channel: str, pattern: str) -> None:
+    """At every second sample the stiffness was half of the true one, "known to ± 0.38 %"; at every third nothing was asked."""
+    number = np.arange(RIG.angle.size)
+    every = {"second": 2, "third": 3, "tenth": 10}
+    where = NOISE > 1.5 if pattern == "random" else number % every[pattern] == 1
+    channels = {"angle": RIG.angle.copy(), "torque": RIG.torque.copy()}
+    channels[channel][where] = -9999
+    result = tvident.identify(channels["angle"], channels["torque"], sample_rate=1000)
+    assert result.summary().startswith("do not trust: ")
+    assert any(f"the {channel} is -9999 at " in one for one in result.advice)
+
+
+def test_readings_that_failed_now_and_then_are_left_out_and_not_asked_for() -> None:
+    torque = np.where(NOISE > 2.6, -9999.0, RIG.torque)
+    result = tvident.identify(RIG.angle, torque, sample_rate=1000)
+    assert "known to" in result.summary().splitlines()[0]
+    np.testing.assert_allclose(np.nanmedian(result.stiffness / RIG.stiffness), 1, atol=0.01)
+
+
+@pytest.mark.parametrize("channel", ["angle", "torque"])
+@pytest.mark.parametrize("where", [slice(0, 200), slice(1000, 1400)])
+def test_marks_that_a_mask_leaves_out_are_missing(channel: str, where: slice) -> None:
+    """A mask says where equations may be, so marks spoilt those beside it, and the noise: "explains nothing of the torque"."""
+    channels = {"angle": RIG.angle.copy(), "torque": RIG.torque.copy()}
+    channels[channel][where] = -9999
+    mask = channels[channel] != -9999
+    result = tvident.identify(channels["angle"], channels["torque"], sample_rate=1000, mask=mask)
+    channels[channel][where] = np.nan
+    missing = tvident.identify(channels["angle"], channels["torque"], sample_rate=1000, mask=mask)
+    np.testing.assert_array_equal(result.stiffness, missing.stiffness)
+    count = where.stop - where.start
+    said = f"the {channel} is -9999 at {count} samples, which mask= leaves out: they are taken as missing"
+    assert result.reasons[0] == said
+    assert not any("-9999" in one for one in result.advice)
+
+
+def test_marks_of_trials_masses_and_what_is_known_are_asked_for() -> None:
+    """No word said so: trials did "not share offset"."""
+    rigs = [tvident.simulate_torsional_rig(duration=1.0, seed=seed) for seed in range(12)]
+    angles, torques = (np.stack([getattr(one, name) for one in rigs]) for name in ("angle", "torque"))
+    torques[3, 200:400] = -9999
+    result = tvident.identify(angles, torques, sample_rate=1000, ensemble_axis=0)
+    assert result.advice[0].startswith("the torque of trial 3 is -9999 at 200 samples, first at 0.2 s, far from all")
+    assert result.summary().startswith("do not trust: ")
+    chain = tvident.Chain(2, springs=[("base", 0), (0, 1)])
+    both = np.stack([RIG.angle, 0.5 * RIG.angle])
+    forces = np.stack([RIG.torque, NOISE])
+    both[1, 500:700] = -9999
+    result = tvident.identify(both, forces, sample_rate=1000, dof_axis=0, structure=chain)
+    assert any(one.startswith("the angle of channel 1 is -9999 at 200 samples") for one in result.advice)
+    stiffness = RIG.stiffness.copy()
+    stiffness[5] = -9999
+    alone = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, stiffness=stiffness)
+    assert any(one.startswith("the stiffness is -9999 at 1 sample,") for one in alone.advice)
+    instrument = np.where(np.arange(RIG.angle.size) == 700, -9999.0, RIG.torque)
+    alone = tvident.identify(RIG.angle, RIG.torque, sample_rate=1000, instrument=instrument)
+    assert any(one.startswith("the instrument is -9999 at 1 sample,") for one in alone.advice)

@@ -6,7 +6,7 @@ from tvident._advice.events import events_that_stay, untold, without_numbers
 from tvident._advice.expansion import FoundExpansion, found_expansion, words_of_expansions
 from tvident._advice.gains import changes_of_gain
 from tvident._advice.instrument import fed_back_in_records, words_with_instrument
-from tvident._advice.marks import MARKED, marks_that_stay
+from tvident._advice.marks import Numbers, marks_that_stay, without_masked_marks
 from tvident._advice.plausible import Plausible
 from tvident._advice.search import FoundBySearch, words_of_search
 from tvident._advice.strong import ExplainedStrong
@@ -14,12 +14,12 @@ from tvident._advice.weak import FREE_OFFSET, Explained
 
 __all__ = [
     "FREE_OFFSET",
-    "MARKED",
     "NOT_DISTINGUISHED",
     "Explained",
     "ExplainedStrong",
     "FoundBySearch",
     "FoundExpansion",
+    "Numbers",
     "Plausible",
     "changes_of_gain",
     "events_that_stay",
@@ -29,6 +29,7 @@ __all__ = [
     "marks_that_stay",
     "spoilt",
     "untold",
+    "without_masked_marks",
     "without_numbers",
     "words_of_expansions",
     "words_of_search",

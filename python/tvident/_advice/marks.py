@@ -1,60 +1,113 @@
-"""Asks whether numbers far from all others mark missing values, where they stand for so long that nothing leaves them out."""
+"""Asks whether numbers far from all others mark missing values, where they stand for so long, or so often, that nothing leaves them out."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from tvident._arguments import CLOSE_TO_MARK, mark_in
-
-MARKED = "does it mark values that are missing?"
-"""What the questions have in common."""
+from tvident._arguments import CLOSE_TO_MARK, marks_in
+from tvident._results import MARKED
 
 _TURNS, _PART = 4, 0.1
 """Times that a torque stands at a number above zero, and the part of all samples, from which on a drive is turned on and off."""
 
-_MOMENT = 50
-"""Samples: what stands for less is a reading that failed, which is seen, left out and said."""
+_MOMENT, _SELDOM = 50, 0.02
+"""Samples, and the part of all: what stands for less, and is not more often, is a reading that failed, which is seen and left out."""
 
 
-def marks_that_stay(
-    channels: Mapping[str, npt.NDArray[np.number]], factors: Mapping[str, float], period: float
-) -> list[tuple[int, str]]:
-    """Return records and questions about what may mark missing values in them.
+@dataclass(frozen=True)
+class Numbers:
+    """Numbers of a call, and what they were before they were converted.
 
     Parameters
     ----------
-    channels : mapping of str to ndarray, shape (..., n)
-        Of a call, in units of results.
-    factors : mapping of str to float
+    name : str
+        What questions call them.
+    values : ndarray, shape (..., n)
+        In units of results.
+    factor : float
         By which they were multiplied.
-    period : float
-        Seconds from one sample to the next.
+    turn : float
+        Within which, in units of results, an angle that wraps stands anywhere; 0 for what does not wrap.
+    is_measured : bool
+        Whether single readings that failed are left out.
     """
+
+    name: str
+    values: npt.NDArray[np.number]
+    factor: float = 1.0
+    turn: float = 0.0
+    is_measured: bool = True
+
+
+def marks_that_stay(numbers: Iterable[Numbers], period: float) -> list[tuple[int, str]]:
+    """Return records and questions about what may mark missing values in them; a period is seconds from one sample to the next."""
     asked = []
-    for name, values in channels.items():
-        for record, one in enumerate(values.reshape(-1, values.shape[-1])):
-            words = _words(name, one, factors[name], period)
-            if words:
-                asked.append((record, words))
+    for one in numbers:
+        for record, values in enumerate(one.values.reshape(-1, one.values.shape[-1])):
+            asked += [(record, words) for words in _questions(one, values, period)]
     return asked
 
 
-def _words(name: str, recorded: npt.NDArray[np.number], factor: float, period: float) -> str:
-    found = mark_in(recorded if factor == 1 else recorded / factor)
-    if found is None:
-        return ""
-    mark, count = found
-    are_marks = np.isclose(recorded, mark * factor, rtol=CLOSE_TO_MARK, atol=0)
-    places = np.flatnonzero(are_marks)
-    runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
-    if max(map(len, runs)) <= _MOMENT and not are_marks[0] and not are_marks[-1]:
-        return ""
-    is_often = len(runs) >= _TURNS and count >= _PART * recorded.size and min(map(len, runs)) > 1
-    if name == "torque" and mark > 0 and is_often:
-        return ""
-    where = f"the {name} is {mark:.7g} at {count} samples, first at {places[0] * period:.4g} s, far from all its other values"
-    cure = f"give numpy.nan in its place, or read the file with missing={mark:.7g}"
-    return f"{where}: {MARKED} It counts as measured; {cure}"
+def without_masked_marks(one: Numbers, mask: npt.NDArray[np.bool_] | None) -> tuple[npt.NDArray[np.number], list[str]]:
+    """Return a channel without marks that a mask leaves out, every one of them, and what was done in words: the mask says what they are."""
+    if mask is None or one.values.ndim > 1 or mask.shape != one.values.shape:
+        return one.values, []
+    values, words = one.values, []
+    for mark, places in _found(one, one.values):
+        if not mask[places].any():
+            values = values.astype(np.float64) if values is one.values else values
+            values[places] = np.nan
+            words.append(
+                f"the {one.name} is {mark:.7g} at {places.size} samples, which mask= leaves out: they are taken as missing"
+            )
+    return values, words
+
+
+def _found(one: Numbers, recorded: npt.NDArray[np.number]) -> list[tuple[float, npt.NDArray[np.intp]]]:
+    """Return numbers that may be marks, as they were before they were converted, and the samples at which they stand."""
+    return [
+        (mark, np.flatnonzero(np.isclose(recorded, mark * one.factor, rtol=CLOSE_TO_MARK, atol=0)))
+        for mark, _ in marks_in(recorded if one.factor == 1 else recorded / one.factor)
+        if abs(mark * one.factor) > one.turn
+    ]
+
+
+def _questions(one: Numbers, recorded: npt.NDArray[np.number], period: float) -> list[str]:
+    found = [
+        (mark, places)
+        for mark, places in _found(one, recorded)
+        if not (one.is_measured and _is_seen(places, recorded.size))
+    ]
+    if (
+        one.name.startswith("torque")
+        and len(found) == 1
+        and found[0][0] > 0
+        and _is_turned_on(found[0][1], recorded.size)
+    ):
+        return []
+    return [_question(one.name, mark, places, period) for mark, places in found]
+
+
+def _runs(places: npt.NDArray[np.intp]) -> list[npt.NDArray[np.intp]]:
+    return np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
+
+
+def _is_seen(places: npt.NDArray[np.intp], samples: int) -> bool:
+    """Return whether readings are so few and so short that they are left out as those that failed."""
+    is_short = max(map(len, _runs(places))) <= _MOMENT and places.size <= _SELDOM * samples
+    return is_short and places[0] > 0 and places[-1] < samples - 1
+
+
+def _is_turned_on(places: npt.NDArray[np.intp], samples: int) -> bool:
+    runs = _runs(places)
+    return len(runs) >= _TURNS and places.size >= _PART * samples and min(map(len, runs)) > 1
+
+
+def _question(name: str, mark: float, places: Sequence[int] | npt.NDArray[np.intp], period: float) -> str:
+    count = f"{len(places)} sample{'s' if len(places) > 1 else ''}"
+    where = f"the {name} is {mark:.7g} at {count}, first at {places[0] * period:.4g} s, far from all its other values"
+    return f"{where}: {MARKED} It counts as measured; give numpy.nan in its place, or read the file with missing={mark:.7g}"

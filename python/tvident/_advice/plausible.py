@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from tvident._arguments import MAY_BE_DAYS, listed, mark_in, told_once
+from tvident._arguments import MAY_BE_DAYS, listed, marks_in, told_once
 from tvident._results import Estimates, Words
 from tvident._units import ROTARY, Axis
 
@@ -80,7 +80,7 @@ class Plausible:
             return []
         if self.turn is not None and any(abs(self.turn - one) < _TURNS for one in (math.pi, _ONE_TURN)):
             return []  # whoever says that it wraps at a turn in rad knows its unit
-        if mark_in(angle / self.axis.angle) is not None:
+        if marks_in(angle / self.axis.angle):
             return []  # which is asked for already
         is_finite = np.isfinite(angle)
         finite = angle if is_finite.all() else angle[is_finite]

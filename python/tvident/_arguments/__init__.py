@@ -16,7 +16,7 @@ from tvident._arguments.digits import explained_in_words, ordinal, own_digits, p
 from tvident._arguments.labelled import check_against_labels, cure_by_labels, implied_times, is_called_time, is_time
 from tvident._arguments.labels import Labels, labels_in, labels_of, labels_out
 from tvident._arguments.lost import check_no_lost_samples
-from tvident._arguments.marks import CLOSE_TO_MARK, mark_in
+from tvident._arguments.marks import CLOSE_TO_MARK, marks_in
 from tvident._arguments.numbers import (
     LARGEST,
     finite_number,
@@ -102,7 +102,7 @@ __all__ = [
     "length_given",
     "listed",
     "mapping",
-    "mark_in",
+    "marks_in",
     "mask",
     "nearest",
     "one_of",

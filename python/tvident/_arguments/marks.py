@@ -36,28 +36,59 @@ CLOSE_TO_MARK = 1e-6
 _LARGEST_PART = 0.9
 """Of the samples of a channel, from which on marks are what was measured."""
 
+_LARGER = 1.5
+"""By how many times a mark is larger than others of its sign: 32768 is the zero of a sensor that stands at 33000."""
+
+_LEVELS, _LOOKED_AT = 3, 10_000
+"""Numbers beside a mark that are the levels of a drive or a switch, and samples that tell mostly that there are more."""
+
+_MOST = 6
+"""Marks of a channel."""
+
 _FEWEST = 8
 """Other values, below which nothing is far from them."""
 
 
 @np.errstate(over="ignore")
-def mark_in(values: npt.NDArray[np.number]) -> tuple[float, int] | None:
-    """Return a number that may mark missing values, far from all others of a channel, and how often it occurs; None where none does."""
+def marks_in(values: npt.NDArray[np.number]) -> list[tuple[float, int]]:
+    """Return numbers that may mark missing values, far from all others of a channel, and how often each occurs."""
     if values.ndim != 1 or values.dtype.kind not in "iuf" or values.size < _FEWEST:
-        return None
+        return []
     are_finite = np.isfinite(values)
     finite = values if are_finite.all() else values[are_finite]
     if finite.size < _FEWEST:
-        return None
-    for mark in {float(finite.min()), float(finite.max())}:
-        others = finite[finite != mark] if _is_mark(mark) else finite[:0]
+        return []
+    marks, others = _ends(finite)
+    while marks:
         if others.size < max(_FEWEST, (1 - _LARGEST_PART) * finite.size):
-            continue
+            return []
         low, high = float(others.min()), float(others.max())
-        beyond = low - mark if mark < low else mark - high
-        if beyond > _FAR * (high - low) and high > low:
-            return mark, finite.size - others.size
-    return None
+        far = [one for one in marks if _is_far(one, low, high)]
+        if len(far) == len(marks):
+            has_levels = np.unique(others[:_LOOKED_AT]).size <= _LEVELS and np.unique(others).size <= _LEVELS
+            return [] if has_levels else [(one, int(np.count_nonzero(finite == one))) for one in sorted(far)]
+        marks, others = far, finite[~np.isin(finite, far)]
+    return []
+
+
+def _ends(finite: npt.NDArray[np.number]) -> tuple[list[float], npt.NDArray[np.number]]:
+    """Return the least and greatest numbers that are marks, one behind the other, and all others."""
+    marks: list[float] = []
+    others = finite
+    while others.size and len(marks) < _MOST:
+        new = [one for one in {float(others.min()), float(others.max())} if _is_mark(one)]
+        if not new:
+            break
+        marks += new
+        others = finite[~np.isin(finite, marks)]
+    return marks, others
+
+
+def _is_far(mark: float, low: float, high: float) -> bool:
+    """Return whether a number is farther from all others than these from each other, and no neighbour of theirs for its size."""
+    beyond = low - mark if mark < low else mark - high
+    is_neighbour = mark * (low if mark < low else high) > 0 and abs(mark) < _LARGER * max(abs(low), abs(high))
+    return beyond > _FAR * (high - low) and high > low and not is_neighbour
 
 
 def _is_mark(value: float) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from tvident._arguments import CLOSE_TO_MARK, is_several, mark_in, real_number
+from tvident._arguments import CLOSE_TO_MARK, is_several, marks_in, real_number
 from tvident._files.cells import is_error, says_no_number
 from tvident._files.names import printable
 
@@ -44,9 +44,7 @@ def said_of_marks(channels: Mapping[str, npt.NDArray[np.number]]) -> list[str]:
     """Return questions about numbers that may mark missing values."""
     messages = []
     for name, values in channels.items():
-        found = mark_in(values)
-        if found is not None:
-            mark, count = found
+        for mark, count in marks_in(values):
             often = "once" if count == 1 else f"{count} times"
             messages.append(
                 f"channel '{printable(name, 40)}' holds {mark:.9g} {often}, far from all its other values: if it marks values that are "

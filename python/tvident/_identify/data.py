@@ -39,6 +39,8 @@ class Data:
     workers : int, optional
     doubts : sequence of (int, str)
         What cannot be known of the channels, and of which record.
+    said : sequence of str
+        What was done to the channels of a single record.
     labels : Labels, optional
         What the angle came with: an index, coordinates.
     axis : Axis, optional
@@ -68,6 +70,7 @@ class Data:
     step: int
     workers: int | None
     doubts: Sequence[tuple[int, str]] = ()
+    said: Sequence[str] = ()
     labels: arguments.Labels | None = None
     axis: Axis = field(default_factory=Axis)
     clipped: Sequence[float] | None = None

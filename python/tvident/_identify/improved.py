@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tvident import _core
-from tvident._advice import MARKED, NOT_DISTINGUISHED, Explained
+from tvident._advice import NOT_DISTINGUISHED, Explained
 from tvident._arguments import percent
 from tvident._equation import BUILT_IN, COEFFICIENTS, FRICTION, OFFSET, Unknown
 from tvident._identify.data import Data, cut
@@ -21,7 +21,7 @@ from tvident._identify.offered import BEYOND_CHANCE, NEXT_TO_NOTHING
 from tvident._identify.remedies import Trial
 from tvident._identify.settings import Request, resolve
 from tvident._identify.used import as_used
-from tvident._results import TRIED, Identification, Words
+from tvident._results import MARKED, TRIED, Identification, Words
 from tvident._status import Status
 from tvident._units import ROTARY
 

@@ -11,13 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._advice import marks_that_stay
 from tvident._clocks import Grid, grid_of
 from tvident._equation import COEFFICIENTS, LINEAR_UNITS, UNITS, has_kind
 from tvident._expansion import Expansion
 from tvident._identify.channels import motion_channels
 from tvident._identify.data import Data
 from tvident._identify.expanded import ExpandedTask, expansions_of
+from tvident._identify.marked import without_marks
 from tvident._identify.methods import StrongForm, WeakForm
 from tvident._identify.own_clocks import OwnClocks, check_every_sample, lag_found, own_clocks
 from tvident._identify.read_torque import with_read_torque
@@ -88,8 +88,8 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         measured["angle"], torque = clocks.channels()
         sampling = {"sample_rate": 1 / clocks.clocks.period, "delta": None, "t": None}
     *arrays, torques = arguments.channels(**measured, torque=torque)
-    channels = dict(zip(measured, arrays, strict=True))
-    channels = {name: scaled(values, _factor_of(name, call[name], axis)) for name, values in channels.items()}
+    factors = {name: _factor_of(name, call[name], axis) for name in measured} | {"torque": axis.torque}
+    channels = {name: scaled(values, factors[name]) for name, values in zip(measured, arrays, strict=True)}
     torques = scaled(torques, axis.torque)
     # Times of two clocks are in seconds by now.
     time_unit = call["time_unit"] if clocks is None or call["sample_rate"] is not None else None
@@ -110,7 +110,9 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
     weighted = weights_of(call["weights"], torques.shape) if clocks is None else weighted
     # What two clocks recorded was checked before; on the grid their gaps are no samples.
     channels, torques = usable_channels(channels, torques, weighted, call["nan_policy"] if clocks is None else "omit")
-    doubts = _marks(channels, torques, call, axis, seconds)
+    channels, torques, doubts, said = without_marks(
+        {**channels, "torque": torques}, factors, call, request.period, seconds
+    )
     turn = request.period
     if turn is not None:
         # Whole periods need not be multiples of the step that the angle was rounded to.
@@ -156,6 +158,7 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
         step=arguments.whole_number("step", call["step"], least=1),
         workers=arguments.worker_count(call["workers"]),
         doubts=[*doubts, *signals.doubts, *moving.doubts],
+        said=said,
         labels=arguments.labels_of(first) if grid is None else None,
         axis=axis,
         clock=signals.clock,
@@ -250,18 +253,6 @@ def _check_attribute(name: str, values: Any, unit: str, factor: float) -> None:
             f"{name} must be in the unit of results where only an attribute says {unit!r}: arithmetic keeps attributes, so nobody knows "
             f"whether the numbers still are; pass tvident.Channel({name}, {unit!r}), or .to_numpy() if they were converted"
         )
-
-
-def _marks(
-    channels: Mapping[str, npt.NDArray[np.number]],
-    torques: npt.NDArray[np.number],
-    call: Mapping[str, Any],
-    axis: Axis,
-    period: float,
-) -> list[tuple[int, str]]:
-    """Return records and questions about numbers in them that may mark missing values."""
-    factors = {name: _factor_of(name, call[name], axis) for name in channels} | {"torque": axis.torque}
-    return marks_that_stay({**channels, "torque": torques}, factors, period)
 
 
 def _in_units_of_results(name: str, value: float | None, factor: float) -> float | None:

@@ -95,6 +95,7 @@ class Told:
             words = replace(words, advice=(*words.advice, *self._where_remedies_are_tried()))
         if data.clock is not None:
             words = replace(words, reasons=(data.clock.words, *words.reasons))
+        words = replace(words, reasons=(*data.said, *words.reasons))
         terms = [one.name for one in self.unknowns if one.name not in COEFFICIENTS]
         lacking = [
             (record, one.words(terms, data.units.get(one.name, ""))) for record, one in enumerate(self.lacking) if one

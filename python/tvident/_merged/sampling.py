@@ -46,6 +46,8 @@ class Sampling:
     workers : int, optional
     bridges : Timed, optional
         How short gaps were bridged; None where none were.
+    questions : sequence of str
+        What cannot be known of the samples.
     """
 
     period: float
@@ -54,6 +56,7 @@ class Sampling:
     passed: Passed | None = None
     workers: int | None = None
     bridges: Timed | None = None
+    questions: Sequence[str] = ()
 
     @classmethod
     def of_grid(
@@ -85,7 +88,7 @@ class Sampling:
     @property
     def of_result(self) -> Sampling:
         """The times of what was found, without how they came about."""
-        return replace(self, clock=None, passed=None, bridges=None)
+        return replace(self, clock=None, passed=None, bridges=None, questions=())
 
     def times(self, samples: int) -> npt.NDArray[np.float64]:
         """Return the times of samples in seconds."""

@@ -24,6 +24,7 @@ from tvident._results.told import Telling
 from tvident._results.torque import correlated_with, kernels_of, touched_by
 from tvident._results.verdict import (
     CHANGING,
+    found_marked,
     known_to,
     negative,
     relative_error,
@@ -34,7 +35,7 @@ from tvident._results.verdict import (
     why_not,
 )
 from tvident._results.windows_beside import WindowsBeside
-from tvident._results.words import BECOMES, FED_BACK, TRIED, UNTOLD_LAG, Words, of_batch
+from tvident._results.words import BECOMES, FED_BACK, MARKED, TRIED, UNTOLD_LAG, Words, of_batch
 
 __all__ = [
     "BECOMES",
@@ -42,6 +43,7 @@ __all__ = [
     "COLUMNS",
     "FED_BACK",
     "KIND_OF_LISTS",
+    "MARKED",
     "POOR",
     "TRIED",
     "UNTOLD_LAG",
@@ -67,6 +69,7 @@ __all__ = [
     "curves_from",
     "every_sample",
     "explained_steps",
+    "found_marked",
     "from_file",
     "in_units_of",
     "kernels_of",

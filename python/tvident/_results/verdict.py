@@ -13,7 +13,7 @@ import numpy as np
 from tvident import _core
 from tvident._arguments import explained_in_words, percent, percentiles, to_digits_of, told_once
 from tvident._results.torque import noise_of_compared
-from tvident._results.words import BECOMES, CONDITIONS, OTHER_UNIT, TRIED
+from tvident._results.words import BECOMES, CONDITIONS, MARKED, OTHER_UNIT, TRIED
 from tvident._status import Status
 from tvident._units import in_words_of
 
@@ -99,10 +99,17 @@ def _verdict(result: Any, share: float | None) -> str:
 
 def _of_one(result: Any, known: float | None) -> str:
     share = cache(lambda: explained(result) if known is None else known)  # a prediction of the whole record
-    reason = _distrusted(result, share) or _found_elsewhere(result.advice)
+    reason = _distrusted(result, share) or found_marked(result.advice) or _found_elsewhere(result.advice)
     if reason:
         return verdict_of_distrusted(result, reason)
     return verdict_of_trusted(result, _errors(result), share())
+
+
+def found_marked(advice: Sequence[str]) -> str | None:
+    """Return that numbers may never have been measured, in words, where advice asks about them."""
+    if any(MARKED in line for line in advice):
+        return "numbers that may mark missing values count as measured"
+    return None
 
 
 def _found_elsewhere(advice: Sequence[str]) -> str | None:

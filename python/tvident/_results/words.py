@@ -14,6 +14,9 @@ BECOMES = " becomes "
 OTHER_UNIT = ("degrees?", "is the time in ")
 """How advice asks about units, of which all numbers depend."""
 
+MARKED = "does it mark values that are missing?"
+"""How advice asks about numbers that may never have been measured."""
+
 FED_BACK = "the torque holds the angle's noise"
 UNTOLD_LAG = "the record does not tell half a sample of lag"
 CONDITIONS = (FED_BACK, UNTOLD_LAG)
