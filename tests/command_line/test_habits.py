@@ -96,6 +96,10 @@ def test_json_says_what_the_summary_says(folder: Path) -> None:
     assert said["parameters"]["inertia"]["value"] == result.constants["inertia"][0]
     assert said["verdict"].startswith("K(t) known to")
     assert said["advice"] == list(result.advice)
+    assert "explanation" not in said
+    explained = json.loads(run(*IDENTIFY, "--json", "--explain").stdout)["explanation"]
+    assert explained == run(*IDENTIFY, "--explain").stdout.split("\noffset = ")[0].splitlines()[: len(explained)]
+    assert explained[0] == "1. What was asked"
 
 
 def test_json_of_channels_and_of_models(folder: Path) -> None:

@@ -6,6 +6,7 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import tvident
@@ -171,10 +172,12 @@ def test_milliseconds_behind_a_colon_are_counted(tmp_path: Path, padded: bool, d
     np.testing.assert_allclose(time - time[0], np.arange(0, 3, 0.005), atol=1e-9)
 
 
-def test_two_digits_behind_a_third_colon_may_be_frames(tmp_path: Path) -> None:
-    cells = [f"00:00:{one // 50:02d}:{one % 50:02d}" for one in range(200)]
+@pytest.mark.parametrize(("rate", "digits"), [(50, "02d"), (25, "d"), (10, "d"), (100, "d")])
+def test_few_digits_behind_a_third_colon_may_be_frames(tmp_path: Path, rate: int, digits: str) -> None:
+    """Frames without zeros before them and tenths were milliseconds, without a word."""
+    cells = [f"00:00:{one // rate:02d}:{one % rate:{digits}}" for one in range(200)]
     path = written(tmp_path, "time,a\n" + "".join(f"{cell},{place}.5\n" for place, cell in enumerate(cells)))
-    with pytest.raises(recordings.FileError, match="may be hundredths of a second or frames"):
+    with pytest.raises(recordings.FileError, match="may be tenths or hundredths of a second or frames"):
         recordings.read(path)
 
 
@@ -186,3 +189,26 @@ def test_dates_with_points_for_colons_are_times(tmp_path: Path) -> None:
         channels = recordings.read(path)
     np.testing.assert_array_equal(list(channels.values())[1], np.arange(30.0))
     np.testing.assert_array_equal(channels["angle (deg)"], np.arange(30) + 0.5)
+
+
+def test_a_clock_says_what_is_wrong_with_its_unit() -> None:
+    """Microseconds in steps of 1e-8 were said to be days, and of `MS` nothing was said."""
+    angle = np.ones(200)
+    with pytest.raises(ValueError, match="check whether the channel is in µs"):
+        _ = tvident.FileRecording({"t [µs]": 1e-8 * np.arange(200), "a": angle}).sample_rate
+    with pytest.raises(
+        ValueError, match=r"'MS' of 'time' is no unit of time, or may mean several: call it 'time \[ms\]'"
+    ):
+        _ = tvident.FileRecording({"time [MS]": np.arange(200.0), "a": angle}).sample_rate
+
+
+@pytest.mark.parametrize(
+    ("name", "step", "cure"),
+    [("time [MS]", 1.0, "time_unit='ms', say: 'MS' is no"), ("time_days", 1e-3 / 86_400, "days \\(1000 Hz\\)")],
+)
+def test_labels_in_an_odd_unit_are_told_with_their_cure(name: str, step: float, cure: str) -> None:
+    """They were in seconds or milliseconds."""
+    rig = tvident.simulate_torsional_rig(duration=1.0)
+    index = pd.Index(step * (0.5 + np.arange(rig.angle.size)), name=name)
+    with pytest.raises(TypeError, match=f"give t=angle.index and .*{cure}"):
+        tvident.identify(pd.Series(rig.angle, index=index), rig.torque)

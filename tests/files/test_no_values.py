@@ -135,9 +135,14 @@ def test_a_command_says_and_takes_marks(tmp_path: Path) -> None:
     clean = tvident.identify(np.where(angle == -9999, np.nan, angle), RIG.torque, sample_rate=1000)
     assert clean.summary().splitlines()[0] == marked.stdout.splitlines()[0]
     assert "--missing" not in run("info", path, "--missing", "-9999").stderr
-    refused = run("identify", path, *named, "--missing", "-9999", "--in-pieces", "-o", tmp_path / "o.npz")
-    assert refused.returncode == 2
-    assert "--in-pieces reads no marks" in refused.stderr
+    in_pieces = run("identify", path, *named, "--missing", "-9999", "--in-pieces", "-o", tmp_path / "o.npy")
+    assert in_pieces.returncode == 0
+    missing = tmp_path / "missing.csv"
+    written = tvident.FileRecording({"time [s]": RIG.time, "angle [rad]": np.where(angle == -9999, np.nan, angle)})
+    tvident.FileRecording({**written, "torque [N m]": RIG.torque}).write(missing)
+    run("identify", missing, *named, "--in-pieces", "-o", tmp_path / "p.npy")
+    first, second = (np.load(tmp_path / f"{one}.npy")["stiffness"] for one in "op")
+    np.testing.assert_array_equal(first, second)
 
 
 @pytest.mark.parametrize(("channel", "unit"), [("angle", "deg"), ("torque", "N mm")])

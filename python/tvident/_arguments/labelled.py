@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._arguments.containers import package_of
+from tvident._arguments.sampling import MAY_BE_DAYS
 from tvident._arguments.times import times_of
 from tvident._units import ROTARY, factor_to, is_convertible, named_unit, times_in_seconds, unit_said
 
@@ -51,9 +52,19 @@ def cure_by_labels(values: Any) -> str:
         if not step > 0 or numbers.dtype.kind != "f":
             continue
         times = "angle.index" if package_of(values) == "pandas" else f"angle[{name!r}]"
-        unit = f" if they are seconds ({1 / step:.6g} Hz), and time_unit='ms' too if they are milliseconds"
-        return f"; the samples are labelled in steps of {step:.6g}: give t={times}{unit}"
+        return f"; the samples are labelled in steps of {step:.6g}: give t={times}{_cure_of_unit(name, step)}"
     return ""
+
+
+def _cure_of_unit(name: Any, step: float) -> str:
+    """Return what else to give beside labels in such steps, so that their unit is known."""
+    _, unit = named_unit(name) if isinstance(name, str) else ("", "")
+    if unit:
+        # A unit of time would have been read.
+        return f" and time_unit='ms', say: {unit!r} is no unit of time, or may mean several"
+    if step <= MAY_BE_DAYS:
+        return f" and time_unit='days' if they are days ({1 / (86_400 * step):.6g} Hz)"
+    return f" if they are seconds ({1 / step:.6g} Hz), and time_unit='ms' too if they are milliseconds"
 
 
 def _labels(values: Any) -> list[tuple[Any, Any]]:

@@ -58,7 +58,8 @@ def identify(
         with replaced(Path(settings_output)) as written:
             written.write((json.dumps(result.settings, indent=1) + "\n").encode())
     if as_json:
-        words = json.dumps(_plain(result), indent=1, ensure_ascii=False)
+        content = _plain(result) | ({"explanation": explained_steps(result).splitlines()} if explain else {})
+        words = json.dumps(content, indent=1, ensure_ascii=False)
     else:
         words = explained_steps(result) if explain else result.summary()
         for name, (value, error) in result.constants.items():

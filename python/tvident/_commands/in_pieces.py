@@ -57,10 +57,6 @@ def identify_in_pieces(
             "--in-pieces goes from a FILE to a file; got "
             f"{'a pipe' if '-' in (file, output) else 'none'}; name the file, and give -o"
         )
-    if marks_missing():
-        raise click.UsageError(
-            "--in-pieces reads no marks of missing values; got --missing; write the file again with NaN in their place"
-        )
     asked: dict[str, Any] = given(dict(options))
     refused = [
         name
@@ -89,6 +85,7 @@ def identify_in_pieces(
         settings=None if settings is None else read_settings(settings),
         lag=None if lag is None else lag_of(lag),
         terms=terms_of(asked.get("terms", ())),
+        missing=marks_missing(),
         progress=wanted_progress(asked.get("progress")),
         **coefficients,
         **{

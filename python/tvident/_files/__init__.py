@@ -15,6 +15,7 @@ from tvident._files.unpacked import ending_of
 
 if TYPE_CHECKING:
     from tvident._files.beginnings import ending_by
+    from tvident._files.no_values import marks_given, without_marks
     from tvident._files.rates import other_rate
     from tvident._files.recorded import FileRecording, increasing_times, read_recording, time_channels
     from tvident._files.recordings import read
@@ -41,6 +42,7 @@ __all__ = [
     "increasing_times",
     "keeps_result",
     "listed",
+    "marks_given",
     "other_rate",
     "place_beside",
     "printable",
@@ -52,6 +54,7 @@ __all__ = [
     "settings_beside",
     "stated_rate",
     "time_channels",
+    "without_marks",
     "write_csv",
     "write_result",
     "write_settings",
@@ -60,7 +63,9 @@ __all__ = [
 
 _READERS = {
     "ending_by": "beginnings",
+    "marks_given": "no_values",
     "other_rate": "rates",
+    "without_marks": "no_values",
     "FileRecording": "recorded",
     "increasing_times": "recorded",
     "read_recording": "recorded",

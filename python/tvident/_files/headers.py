@@ -369,8 +369,8 @@ def not_a_time(place: int, name: str, cell: str) -> str:
 
 
 def may_be_frames(name: str, first: str) -> str:
-    """Return the message about times that end in a third colon and two digits."""
+    """Return the message about times that end in a third colon and one or two digits."""
     return (
-        f"what stands behind a third colon must be milliseconds; in column '{printable(name, 40)}' it has two digits throughout, as in "
-        f"'{printable(first, 40)}', and may be hundredths of a second or frames; write 12:30:00.05"
+        f"what stands behind a third colon must be milliseconds; in column '{printable(name, 40)}' it never has three digits, as in "
+        f"'{printable(first, 40)}', and may be tenths or hundredths of a second or frames; write 12:30:00.05"
     )

@@ -174,12 +174,13 @@ class FileRecording(Mapping[str, Channel]):
         time = self.time
         if time is None or time.size < 2:  # noqa: PLR2004 - a period has two ends
             several = increasing_times(self._channels)
-            had = f"several: {listed(several)}" if len(several) > 1 else listed(self)
+            had = f"several: {listed(several)}" if len(several) > 1 else listed(self._headers())
             raise ValueError(
-                f"a sample rate needs a channel of times; {self._source} has {had}; give sample_rate= where it is needed"
+                f"a sample rate needs a channel of times; {self._source} has {had}; {self._cure_of_times()}give sample_rate= where it is "
+                "needed"
             )
         try:
-            _check_no_counts(time)
+            _check_no_counts(time, getattr(self._clock(), "unit", ""))
             period = arguments.sample_period(time.size, t=time)
             for values in self._channels.values():
                 if values.dtype.kind in "iuf" and values.shape == time.shape and not _increases(values):
@@ -207,6 +208,11 @@ class FileRecording(Mapping[str, Channel]):
         sample_rate : where they are uniform.
         select : a part by time.
         """
+        clock = self._clock()
+        return None if clock is None else np.asarray(times_in_seconds(clock), dtype=np.float64)
+
+    def _clock(self) -> Channel | None:
+        """Return the channel of times; None where there is none, or several that differ."""
         long = {name: values for name, values in self._channels.items() if values.ndim == 1 and values.size > 1}
         found = [name for name, values in long.items() if arguments.is_time(name, values.unit)]
         # Structures and groups put their names before those of their channels.
@@ -216,7 +222,15 @@ class FileRecording(Mapping[str, Channel]):
         called = found[:1] or (grouped if len(grouped) == 1 else increasing_times(long))
         # Groups that were sampled together have one clock.
         called = called[:1] if all(np.array_equal(long[called[0]], long[name]) for name in called[1:]) else called
-        return np.asarray(times_in_seconds(long[called[0]]), dtype=np.float64) if len(called) == 1 else None
+        return long[called[0]] if len(called) == 1 else None
+
+    def _cure_of_times(self) -> str:
+        """Return what to do about a channel that is called as times are, and whose unit is none of time, or may mean several."""
+        for name, values in self._channels.items():
+            bare = name.rpartition(".")[2]
+            if values.ndim and arguments.is_called_time(bare) and not arguments.is_time(bare, values.unit):
+                return f"{values.unit!r} of {name!r} is no unit of time, or may mean several: call it '{name} [ms]', say, or "
+        return ""
 
     def select(self, t0: float, t1: float) -> FileRecording:
         """Return the samples from one time to another.
@@ -304,7 +318,7 @@ def _rate_of(name: str, value: Channel) -> float | None:
     return None
 
 
-def _check_no_counts(time: npt.NDArray[np.float64]) -> None:
+def _check_no_counts(time: npt.NDArray[np.float64], unit_said: str) -> None:
     """Refuse times so large that they count smaller parts of seconds since 1970, as clocks of computers do."""
     for unit, word, least in _COUNTS:
         if time[0] >= least:
@@ -313,6 +327,10 @@ def _check_no_counts(time: npt.NDArray[np.float64]) -> None:
                 f"'time [{unit}]', or give t= and time_unit='{unit}', if it counts {word} since 1970"
             )
     step = float(time[-1] - time[0]) / (time.size - 1)
+    if 0 < step <= arguments.MAY_BE_DAYS and unit_said:
+        raise ValueError(
+            f"one sample in {step:.4g} s would be {1 / step:.4g} Hz; check whether the channel is in {unit_said}, and call it by its unit"
+        )
     if 0 < step <= arguments.MAY_BE_DAYS:
         raise ValueError(
             f"one sample in {step:.4g} s would be {1 / step:.4g} Hz; call the channel 'time [days]', or give t= and time_unit='days', if "

@@ -37,8 +37,8 @@ _FORMS = tuple(
 )
 _DAY, _HOUR = 86_400, 3600
 
-_MILLI, _HUNDREDTHS = 3, 2
-"""Digits of milliseconds, and of what may be hundredths of a second or frames."""
+_MILLI = 3
+"""Digits of milliseconds."""
 
 
 @dataclass(frozen=True)
@@ -154,8 +154,8 @@ class TimeColumn:
 
     @property
     def may_count_frames(self) -> bool:
-        """Whether two digits stand behind the third colon of every time."""
-        return self._counted == {_HUNDREDTHS}
+        """Whether one or two digits stand behind the third colon of every time: milliseconds of a recording have three sooner or later."""
+        return 0 < max(self._counted, default=0) < _MILLI
 
     @property
     def is_dated(self) -> bool:

@@ -15,7 +15,7 @@ from tvident import _arguments as arguments
 from tvident import _core
 from tvident._choices import VERSION
 from tvident._equation import GivenTerm
-from tvident._files import FileError, FileWarning, check_apart, ending_of, full_name, other_rate
+from tvident._files import FileError, FileWarning, check_apart, ending_of, full_name, marks_given, other_rate
 from tvident._identify import Method
 from tvident._in_pieces.copied import copied
 from tvident._in_pieces.found import FileIdentification
@@ -59,6 +59,7 @@ def identify_file(
     lag: float | str | None = None,
     quantisation: float | None = None,
     nan_policy: arguments.RowPolicy = "omit",
+    missing: float | Sequence[float] = (),
     step: int = 1,
     settings: Mapping[str, Any] | None = None,
     workers: int | None = None,
@@ -87,6 +88,8 @@ def identify_file(
         The channel of weights: one over the variance of the noise at every sample, relative to the others, 0 where it is not to be used.
     angle_unit, torque_unit : str, optional
         Units of the channels, where the file says none or others.
+    missing : float or sequence of float, optional
+        Numbers that mark values that are missing, as -9999.
     method, inertia, damping, stiffness, terms, lag, quantisation, nan_policy, step, settings, workers : optional
         As in :func:`identify`; parameters are kinds or numbers, terms are built-in ones without inner parameters.
     progress : bool or callable, optional
@@ -154,6 +157,7 @@ def identify_file(
     arguments.one_of("nan_policy", nan_policy, ("omit", "propagate", "raise"))
     _check_named({"angle": angle, "torque": torque}, {"t": t, "weights": weights}, settings)
     _check_units(angle_unit=angle_unit, torque_unit=torque_unit)
+    marks = marks_given(missing)
     delta, sample_rate = (
         None if one is None else arguments.positive_number(name, one)
         for name, one in (("delta", delta), ("sample_rate", sample_rate))
@@ -181,13 +185,14 @@ def identify_file(
             weights,
         ],
         "units": [angle_unit, torque_unit],
-        "asked": [repr(method), repr(given), nan_policy, every, repr(dict(settings or {}))],
+        "asked": [repr(method), repr(given), nan_policy, every, repr(dict(settings or {})), *marks],
     }
     with ExitStack() as stack, arguments.reporter(progress, "identification") as told_of:
         report = None if told_of is None else arguments.WatchedProgress(told_of)
         source, kept = _opened(source_path, place, told, mark if is_text else None)
         stack.callback(kept.close)
         stack.callback(source.close)
+        source = source.with_missing(marks)
         try:
             recording = _recording(source, (angle, torque, t), (angle_unit, torque_unit), (delta, sample_rate))
             if not is_text:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from tvident._files import FileError, ending_of, full_name, listed, printable
+from tvident._files import FileError, ending_of, full_name, listed, printable, without_marks
 from tvident._units import named_unit
 
 _UNITS = ("unit", "units", "Unit", "Units", "UNITS")
@@ -52,6 +52,24 @@ class Source:
         full = full_name(self.channels, name, self.place)
         channel, samples = self.channels[full]
         return channel, samples, named_unit(full)[1]
+
+    def with_missing(self, marks: Sequence[float]) -> Source:
+        """Return the same recording with NaN in place of numbers that mark missing values."""
+        if not marks:
+            return self
+        channels = {name: (_Unmarked(channel, marks), samples) for name, (channel, samples) in self.channels.items()}
+        return replace(self, channels=channels)
+
+
+@dataclass(frozen=True)
+class _Unmarked:
+    """A channel with NaN in place of numbers that mark missing values."""
+
+    channel: SourceChannel
+    marks: Sequence[float]
+
+    def read(self, first: int, end: int) -> npt.NDArray[Any]:
+        return without_marks(self.channel.read(first, end), self.marks)
 
 
 @dataclass(frozen=True)
