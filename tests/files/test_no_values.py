@@ -168,6 +168,8 @@ def test_a_torque_that_is_turned_on_and_off_is_no_mark(level: float) -> None:
     is_on = number // 500 % 2 == 0
     torque = np.where(is_on, level, noise[0])
     assert marks_that_stay([Numbers("torque", torque)], 1e-3) == []
+    both = np.select([number // 250 % 4 == 0, number // 250 % 4 == 2], [level, -level], noise[0])
+    assert marks_that_stay([Numbers("torque", both)], 1e-3) == []
     for missing in (np.where(is_on, -level, noise[0]), np.where(number // 500 == 3, level, noise[0])):
         assert len(marks_that_stay([Numbers("torque", missing)], 1e-3)) == 1
 
@@ -202,6 +204,8 @@ def test_marks_of_both_signs_are_asked_for(tmp_path: Path, marks: tuple[float, .
         np.where(np.arange(300) < 10, 32768.0, 33000 + 20 * NOISE[:300]),  # binary with an offset, at rest first
         np.where(np.arange(300) < 10, 65535.0, 65000 + 20 * NOISE[:300]),
         np.tile([0.0, 9999.0, 5.0], 100),
+        np.where(NOISE > 2, 1000.0, NOISE),  # a limit, which was taken for 999.999
+        np.where(NOISE > 2, -100_000.0, NOISE),
     ],
 )
 def test_levels_and_offsets_are_no_marks(values: np.ndarray) -> None:

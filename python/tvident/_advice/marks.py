@@ -82,12 +82,8 @@ def _questions(one: Numbers, recorded: npt.NDArray[np.number], period: float) ->
         for mark, places in _found(one, recorded)
         if not (one.is_measured and _is_seen(places, recorded.size))
     ]
-    if (
-        one.name.startswith("torque")
-        and len(found) == 1
-        and found[0][0] > 0
-        and _is_turned_on(found[0][1], recorded.size)
-    ):
+    is_driven = any(mark > 0 for mark, _ in found) and all(_is_turned_on(places, recorded.size) for _, places in found)
+    if one.name.startswith("torque") and is_driven:
         return []
     return [_question(one.name, mark, places, period) for mark, places in found]
 

@@ -27,6 +27,9 @@ _MARKS: Final = np.unique(
 _NO_MARKS: Final = (99.0, 99.9, 99.99, 99.25, 99.999)
 """Numbers that are measured more often than they are marks; -99 is one."""
 
+_ROUND: Final = frozenset(10.0**power for power in range(2, 10))
+"""What is measured at a limit, though 999.999 is close to 1000."""
+
 _FAR = 1.0
 """By how many times the range of all other values a mark is beyond them."""
 
@@ -93,4 +96,8 @@ def _is_far(mark: float, low: float, high: float) -> bool:
 
 def _is_mark(value: float) -> bool:
     """Return whether programs write a number where nothing was measured."""
-    return value not in _NO_MARKS and bool(np.isclose(_MARKS, abs(value), rtol=CLOSE_TO_MARK, atol=0).any())
+    return (
+        value not in _NO_MARKS
+        and abs(value) not in _ROUND
+        and bool(np.isclose(_MARKS, abs(value), rtol=CLOSE_TO_MARK, atol=0).any())
+    )
