@@ -47,3 +47,13 @@ def test_one_clock_for_two_is_refused() -> None:
     assert "clocks of their own" in run(*command, "--sample-rate", "1000").stderr
     alike = ["together" if one == "torque" else one for one in command]
     assert "clocks of their own" not in run(*alike, "--time", "rig.time").stderr
+    assert "and got none; give --time rig.time --torque-time rig.time_2" in run(*command).stderr
+
+
+def test_a_clock_is_that_of_the_group_of_the_angle(tmp_path: Path) -> None:
+    """Of topics that are called angle and torque, `--time time` was asked which of two it were."""
+    made = tvident.simulate_torsional_rig(duration=3.0)
+    named = {"angle.time": made.time, "angle.data": made.angle, "torque.time": made.time, "torque.data": made.torque}
+    np.savez(tmp_path / "rig.npz", **named)  # type: ignore[arg-type]
+    command = ("identify", tmp_path / "rig.npz", "--angle", "angle.data", "--torque", "torque.data", "--time", "time")
+    assert "known to" in run(*command).stdout

@@ -51,12 +51,12 @@ def times_of(channels: recordings.Channels, name: str | None, beside: str, file:
         return channel_of(channels, name, file)
     except KeyError:
         try:
-            group = full_name(channels, beside, "").rpartition(beside)[0]
+            group = named_unit(full_name(channels, beside, ""))[0].rpartition(".")[0]
         except KeyError:
             group = ""
         if not group:
             raise
-        return channel_of(channels, f"{group}{name}", file)
+        return channel_of(channels, f"{group}.{name}", file)
 
 
 def check_has_times(who: str, given: bool, channels: recordings.Channels, file: str | None) -> None:  # noqa: FBT001 - said by its name

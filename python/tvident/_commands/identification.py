@@ -70,12 +70,13 @@ def identified(
 ) -> tvident.Identification:
     """Return what is identified from the channels of a file with these options."""
     is_given = check_time(options["sample_rate"], options["delta"], time_channel)
-    check_has_times("an identification needs", is_given, channels, file)
     of_method = {name: value for name, value in given(options).items() if name in NAMES}
     turn = None if period is None else scaled(np.asarray(period_of(period)), angle_scale, channels, file)
     motion = {"angle": angle, "velocity": velocity, "acceleration": acceleration}
     named = {name: channel for name, channel in motion.items() if channel is not None}
-    check_own_clocks(channels, [*named.values(), torque], time_channel, torque_time, file)
+    has_rate = is_given and time_channel is None
+    check_own_clocks(channels, [*named.values(), torque], time_channel, torque_time, file, has_rate=has_rate)
+    check_has_times("an identification needs", is_given, channels, file)
     recorded = [source_of(channels, name, file) for name in (*named.values(), torque)]
     times = times_of(channels, time_channel, next(iter(named.values())), file)
     signals = dict(zip(named, recorded, strict=False))

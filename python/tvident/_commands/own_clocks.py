@@ -22,7 +22,13 @@ _TIME = re.compile(r"time(_[0-9]+)?")
 
 
 def check_own_clocks(
-    channels: recordings.Channels, names: Sequence[str], time: str | None, torque_time: str | None, file: str | None
+    channels: recordings.Channels,
+    names: Sequence[str],
+    time: str | None,
+    torque_time: str | None,
+    file: str | None,
+    *,
+    has_rate: bool,
 ) -> None:
     """Refuse the clock of one channel for another that has a clock of its own, and say how to give both; warn beside a sample rate."""
     if torque_time is not None or file is None or ending_of(Path(file)).lower() not in _GROUPED:
@@ -35,10 +41,11 @@ def check_own_clocks(
         return
     first, last = (printable(named_unit(str(one))[0]) for one in (clocks[0], clocks[-1]))
     cure = f"--time {shlex.quote(first)} --torque-time {shlex.quote(last)}"
-    if time is not None:
+    if not has_rate:
+        got = "none" if time is None else f"--time {printable(time)} for both"
         raise click.UsageError(
-            f"angle and torque must have the times at which each was sampled; {printable(file)} has {first} and {last}, and got "
-            f"--time {printable(time)} for both; give {cure}, or the same for both if they do have one clock"
+            f"angle and torque must have the times at which each was sampled; {printable(file)} has {first} and {last}, and got {got}; "
+            f"give {cure}, or the same for both if they do have one clock"
         )
     where = f"{printable(file)}: angle and torque have clocks of their own, {first} and {last}"
     click.echo(f"Warning: {where}; a sample rate takes their first samples as of one time; give {cure}", err=True)
