@@ -16,6 +16,8 @@ import zarr
 from asammdf import MDF, Signal
 from nptdms import ChannelObject, TdmsWriter
 from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
 import recorded_files as examples
@@ -388,3 +390,23 @@ def test_a_store_that_is_not_whole_says_so(tmp_path: Path) -> None:
     (tmp_path / "empty.zarr").mkdir()
     with pytest.raises(recordings.FileError, match="must not be empty; this one has no bytes; copy it again"):
         recordings.read(tmp_path / "empty.zarr")
+
+
+def test_bags_of_compressed_messages_and_damaged_ones_say_what_to_do(tmp_path: Path) -> None:
+    """It said "Invalid or unsupported CDR encapsulation", and of a bag whose recorder was ended to copy it again."""
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    number: Any = store.types["std_msgs/msg/Float64"]
+    for folder, is_packed in (("packed", True), ("plain", False)):
+        writer = Ros2Writer(tmp_path / folder, version=9, storage_plugin=StoragePlugin.MCAP)
+        if is_packed:
+            writer.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
+        with writer:
+            topic = writer.add_connection("/angle", number.__msgtype__, typestore=store)
+            for at in T:
+                content = store.serialize_cdr(number(data=at), number.__msgtype__)
+                writer.write(topic, round(1e9 * at) + 10**18, content)
+    packed, plain = (next((tmp_path / one).glob("*.mcap")) for one in ("packed", "plain"))
+    assert read(packed)[1] == "angle (each message is compressed; write it again with ros2 bag convert)"
+    plain.write_bytes(plain.read_bytes()[:-20])
+    with pytest.raises(recordings.FileError, match=r"says: [^;]*[^.]; copy it again, or repair it: mcap recover"):
+        recordings.read(plain)

@@ -83,7 +83,9 @@ def read_foreign(path: Path, say: Say) -> Channels:
         ended = f"took more than {seconds} s" if is_late else f"ended with status {process.returncode}"
         raise FileError(f"{kind.name} must be whole; its reader {ended}; copy it again, or {kind.cure}")
     if last["error"]:
-        raise FileError(f"{kind.name} must be whole; its reader says: {printable(last['error'], 300)}; {kind.cure}")
+        raise FileError(
+            f"{kind.name} must be whole; its reader says: {printable(last['error'], 300).rstrip('.')}; {kind.cure}"
+        )
     if last["skipped"]:
         say(f"not read: {listed(last['skipped'])}")
     for remark in last["remarks"]:

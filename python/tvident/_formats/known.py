@@ -44,7 +44,13 @@ _MDF = Format("an MDF file", "mdf", "asammdf", "mdf", slowness=4)
 _UFF = Format("a universal file", "uff", "pyuff", "uff")
 _XDF = Format("an XDF file", "xdf", "pyxdf", "xdf")
 _ZARR = Format("a Zarr store", "zarr_arrays", "zarr", "io", slowness=2)
-_ROS = Format("a ROS bag", "ros", "rosbags", "ros")
+_ROS = Format(
+    "a ROS bag",
+    "ros",
+    "rosbags",
+    "ros",
+    "copy it again, or repair it: mcap recover, ros2 bag reindex or rosbag reindex",
+)
 
 FORMATS = {
     ".mat": _MATLAB,

@@ -12,6 +12,9 @@ from tvident._formats.told import cut, in_words
 _JOINTS = "sensor_msgs/msg/JointState"
 _QUANTITIES = ("position", "velocity", "effort")
 
+_ZSTD = b"\x28\xb5\x2f\xfd"
+"""How what Zstandard compressed begins."""
+
 _MOST_ELEMENTS = 64
 """Of an array in a message: more is a picture or a cloud of points."""
 
@@ -31,7 +34,11 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
             try:
                 topic.add(reader.deserialize(raw, connection.msgtype), received)
             except Exception as error:  # noqa: BLE001 - of one topic; the others may be whole
-                topic.failed = in_words(error)
+                # Only the file of settings beside a bag says so.
+                is_packed = bytes(raw[:4]) == _ZSTD
+                topic.failed = (
+                    "each message is compressed; write it again with ros2 bag convert" if is_packed else in_words(error)
+                )
     groups = []
     read = [topic for topic in collected.values() if topic.columns and not topic.failed]
     # Topics that began later have later times.
