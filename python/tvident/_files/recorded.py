@@ -174,10 +174,12 @@ class FileRecording(Mapping[str, Channel]):
         time = self.time
         if time is None or time.size < 2:  # noqa: PLR2004 - a period has two ends
             several = increasing_times(self._channels)
-            had = f"several: {listed(several)}" if len(several) > 1 else listed(self._headers())
+            had, cure = listed(self._headers()), self._cure_of_times()
+            if len(several) > 1:
+                had = f"several: {listed(several)}"
+                cure = f"give the clocks of angle and torque, such as t=(recording[{several[0]!r}], recording[{several[1]!r}]), or "
             raise ValueError(
-                f"a sample rate needs a channel of times; {self._source} has {had}; {self._cure_of_times()}give sample_rate= where it is "
-                "needed"
+                f"a sample rate needs a channel of times; {self._source} has {had}; {cure}give sample_rate= where it is needed"
             )
         try:
             _check_no_counts(time, getattr(self._clock(), "unit", ""))
