@@ -27,6 +27,7 @@ from tvident._commands.equation import lag_of, parameter_of, terms_of
 from tvident._commands.given import check_time, given
 from tvident._commands.named import named
 from tvident._commands.output import PICTURE, RECORDING, RESULTS, check_outputs, give, save_figure
+from tvident._commands.own_clocks import check_own_clocks
 from tvident._commands.rates import say_other_rate
 from tvident._commands.scales import scaled
 from tvident._commands.words import in_options
@@ -58,6 +59,7 @@ def compare(
         {RECORDING: file, "the angle": angle, "the torque": torque, "the mask": mask},
     )
     channels = channels_in(file)
+    check_own_clocks(channels, [angle, torque], time_channel, None, file, has_rate=False, takes_both=False)
     check_has_times("compare needs", check_time(options["sample_rate"], options["delta"], time_channel), channels, file)
     common: dict[str, Any] = {
         name: parameter_of(value, channels, file) if name in COEFFICIENTS else value

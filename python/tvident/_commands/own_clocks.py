@@ -29,6 +29,7 @@ def check_own_clocks(
     file: str | None,
     *,
     has_rate: bool,
+    takes_both: bool = True,
 ) -> None:
     """Refuse the clock of one channel for another that has a clock of its own, and say how to give both; warn beside a sample rate."""
     if torque_time is not None or file is None or ending_of(Path(file)).lower() not in _GROUPED:
@@ -40,6 +41,11 @@ def check_own_clocks(
     if None in clocks or len(clocks) < 2 or _are_one(channels, clocks):  # noqa: PLR2004 - a motion and a torque
         return
     first, last = (printable(named_unit(str(one))[0]) for one in (clocks[0], clocks[-1]))
+    if not takes_both:
+        raise click.UsageError(
+            f"candidates are compared on channels of one clock; {printable(file)} has {first} and {last}; resample one channel at the "
+            "times of the other, or give identify both clocks, and --term"
+        )
     cure = f"--time {shlex.quote(first)} --torque-time {shlex.quote(last)}"
     if not has_rate:
         got = "none" if time is None else f"--time {printable(time)} for both"
