@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy.typing as npt
 from tvident import _core
 from tvident._arguments import with_error
 from tvident._equation import BUILT_IN, COEFFICIENTS, Unknown
+from tvident._identify.blocks import ROUNDING, products, solved, without
 from tvident._identify.columns import Columns
 from tvident._identify.data import Data, cut
 from tvident._identify.methods import StrongForm
@@ -24,20 +24,11 @@ Array = npt.NDArray[np.float64]
 _MOST = 1 << 14
 """Samples that are looked at, in the middle of a record."""
 
-_FEWEST_BLOCKS = 12
-"""Blocks of equations that tell how much a factor scatters."""
-
 _EXPLAINED = 0.8
 """And where it leaves at most this part of what is left without it: what biased derivatives leave any term explains a little."""
 
-_ROUNDING = 1e-12
-"""Less than this part of the torque's squares is rounding."""
-
 _AS_GOOD = 1.05
 """A pendulum is named before a spring that softens where it leaves at most so many times as much."""
-
-_BUFFERS = 256 << 20
-"""Bytes that OpenBLAS takes at most when it is used first."""
 
 _NO_SPRING = 0.1
 """Beside gravity there is no other spring worth a word where its stiffness is less than this part of it."""
@@ -125,43 +116,12 @@ def lacking_terms(
         usable if data.weights is None else usable * data.weights.values[..., some][..., inside].reshape(usable.shape)
     )
     rows = np.where(usable[..., np.newaxis], rows, 0.0) * np.sqrt(weights)[..., np.newaxis]
-    squares = _products(rows, max(length, found[0].regression_window))
+    squares = products(rows, max(length, found[0].regression_window))
     if squares is None:
         return nothing
     windowed = [place for place, kind in enumerate(kinds) if kind != "constant"]
     spring = next((place for place, one in enumerate(unknowns) if one.name == "stiffness"), None)
     return [_Test(one[0], one[1], windowed, constant, names, spring).result() for one in zip(*squares, strict=True)]
-
-
-@cache
-def _start_blas() -> None:
-    """Have OpenBLAS take its buffers once there is memory for them: where there is none it ends the process.
-
-    Raises
-    ------
-    MemoryError
-        If there is none.
-    """
-    np.empty(_BUFFERS, np.uint8)
-    one = np.eye(2)
-    np.linalg.lstsq(one, one @ np.linalg.solve(one, one), rcond=None)
-
-
-def _products(rows: Array, length: int) -> tuple[Array, Array] | None:
-    """Return products of columns of norm one in every block of rows, and the norms; None where blocks are few.
-
-    Products have the shape (records, blocks, columns, columns).
-    """
-    records, samples, columns = rows.shape
-    blocks = samples // length
-    if blocks < _FEWEST_BLOCKS:
-        return None
-    _start_blas()
-    blocked = rows[:, : blocks * length].reshape(records, blocks, length, columns)
-    products = np.swapaxes(blocked, -1, -2) @ blocked
-    norms = np.sqrt(np.einsum("rbii->ri", products))
-    norms = np.where(norms > 0, norms, 1.0)
-    return products / (norms[:, np.newaxis, :, np.newaxis] * norms[:, np.newaxis, np.newaxis, :]), norms
 
 
 @dataclass(frozen=True)
@@ -177,24 +137,24 @@ class _Test:
 
     def result(self) -> Lacking | None:
         """Return the term that explains most of what is left, if it explains enough."""
-        left = self._without_windowed()
+        left = without(self.products, self.windowed)
         if not np.isfinite(left).all():
             # A candidate, such as the cube of a large angle, is beyond doubles.
             return None
         total, rhs = left.sum(axis=0), left.shape[-1] - 1
-        base, _ = _solved(total, self.constant)
-        if not base > _ROUNDING * total[rhs, rhs]:
+        base, _ = solved(total, self.constant)
+        if not base > ROUNDING * total[rhs, rhs]:
             return None
         tried: dict[str, tuple[float, Lacking]] = {}
         for number, name in enumerate(self.names):
             place = len(self.windowed) + len(self.constant) + number
-            rest, values = _solved(total, [*self.constant, place])
+            rest, values = solved(total, [*self.constant, place])
             own = np.zeros(rhs + 1)
-            own[self.constant], own[place] = -_solved(total, self.constant, place)[1], 1.0
+            own[self.constant], own[place] = -solved(total, self.constant, place)[1], 1.0
             errors = np.zeros(rhs + 1)
             errors[[*self.constant, place]], errors[rhs] = -values, 1.0
             scores, square = np.einsum("i,bij,j->b", own, left, errors), own @ total @ own
-            if not square > _ROUNDING:
+            if not square > ROUNDING:
                 continue
             unit = self.norms[rhs] / self.norms[place]
             error = float(np.sqrt(np.sum(scores**2))) / square
@@ -216,20 +176,3 @@ class _Test:
             instead = [name for name in tried if BUILT_IN[name].spring == "instead"]
             best = next((name for name in instead if tried[name][0] <= _AS_GOOD * tried[best][0]), best)
         return tried[best][1]
-
-    def _without_windowed(self) -> Array:
-        """Return products of what windowed unknowns of every block leave of the columns."""
-        if not self.windowed:
-            return self.products
-        inner = self.products[:, self.windowed][:, :, self.windowed]
-        across = self.products[:, self.windowed]
-        scale = np.trace(inner, axis1=1, axis2=2)[:, np.newaxis, np.newaxis]
-        inner = inner + (_ROUNDING * scale + np.finfo(float).tiny) * np.eye(len(self.windowed))
-        return np.asarray(self.products - np.swapaxes(across, 1, 2) @ np.linalg.solve(inner, across))
-
-
-def _solved(total: Array, places: list[int], rhs: int = -1) -> tuple[float, Array]:
-    """Return what columns leave of the squares of another, and their factors."""
-    normal, product = total[np.ix_(places, places)], total[places, rhs]
-    values = np.linalg.lstsq(normal, product, rcond=1e-13)[0]
-    return float(total[rhs, rhs] - product @ values), np.asarray(values, np.float64)

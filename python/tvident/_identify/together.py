@@ -144,7 +144,9 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
     TypeError
         If there is no sample period, or arrays hold no numbers.
     """
-    # A room of many files, which calls with one trial of one mass need not wait for.
+    # Rooms of many files, which calls with one trial of one mass need not wait for.
+    from tvident._identify.between_masses import with_lacking  # noqa: PLC0415
+    from tvident._identify.look_at_masses import SOUGHT  # noqa: PLC0415
     from tvident._merged import (  # noqa: PLC0415
         AskedTogether,
         Earlier,
@@ -190,17 +192,19 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
             workers=arguments.worker_count(options.workers),
             report=report,
         )
-        joints = all_terms(list(dict.fromkeys(name for name, _ in getattr(options.structure, "terms", ()))), "constant")
-        values = _Terms([*joints, *terms], sampling.period, asked.workers)
+        joints = dict.fromkeys([*SOUGHT, *(name for name, _ in getattr(options.structure, "terms", ()))])
+        values = _Terms([*all_terms(list(joints), "constant"), *terms], sampling.period, asked.workers)
         if sampling.clock is not None:
             if trials is not None:
                 return identify_trials(trials.on_grid(sampling), asked, values)
-            return identify_masses([one.on_grid(sampling) for one in masses], asked, values)
+            masses = [one.on_grid(sampling) for one in masses]
+            return with_lacking(identify_masses(masses, asked, values), masses, asked, values)
         if trials is not None:
             whole, bridges = trials_over_gaps(trials, options.settings, asked.workers)
             return identify_trials(whole, asked.bridged(bridges), values)
         joint, bridges = masses_over_gaps(masses, options.settings, asked.workers)
-        return identify_masses(joint, asked.bridged(bridges), values)
+        asked = asked.bridged(bridges)
+        return with_lacking(identify_masses(joint, asked, values), joint, asked, values)
 
 
 def _trials(angle: Any, torque: Any, options: Options, axis: Axis) -> tuple[Trials, list[Masses]]:

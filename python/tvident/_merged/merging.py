@@ -15,6 +15,7 @@ from tvident._merged.expanded import FoundExpanded
 from tvident._merged.predicted import Equations
 from tvident._merged.recorded import MergedRecorded
 from tvident._merged.sampling import Sampling
+from tvident._merged.structure import Link
 
 Array = npt.NDArray[np.float64]
 
@@ -46,6 +47,31 @@ class Part:
 
 
 @dataclass(frozen=True)
+class LackingTerm:
+    """A term that a chain lacks: what acts between which two, its factor and the standard error of that."""
+
+    name: str
+    link: Link
+    value: float
+    stderr: float
+
+
+@dataclass(frozen=True)
+class LackingTerms:
+    """Terms that a chain lacks.
+
+    Parameters
+    ----------
+    terms : sequence of LackingTerm
+    changes : mapping of str to ndarray
+        By how much every element is another beside them.
+    """
+
+    terms: Sequence[LackingTerm]
+    changes: Mapping[str, Array]
+
+
+@dataclass(frozen=True)
 class Merging:
     """What a result is made of.
 
@@ -72,6 +98,8 @@ class Merging:
         Names of the terms, as asked for.
     kinds_of_terms : mapping of str to str
         Kinds of those that were given one.
+    lacking : LackingTerms, optional
+        Terms that were found to be missing by trying them.
     """
 
     elements: Sequence[Element]
@@ -89,6 +117,7 @@ class Merging:
     is_part: bool = False
     terms: Sequence[str] = ()
     kinds_of_terms: Mapping[str, str] = field(default_factory=dict)
+    lacking: LackingTerms | None = None
 
     @property
     def factors(self) -> frozenset[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, TypeAlias
@@ -17,7 +17,7 @@ from tvident._merged.elements import matrix_of
 from tvident._merged.expanded import FoundExpanded
 from tvident._merged.held_back import HeldBackTorque
 from tvident._merged.heterogeneity import differences_of, excess
-from tvident._merged.merging import Identifiable, Merging, Part
+from tvident._merged.merging import Identifiable, LackingTerms, Merging, Part
 from tvident._merged.oscillating import Oscillating
 from tvident._merged.reported import Reported
 from tvident._merged.short import as_html, in_one_line
@@ -29,6 +29,9 @@ from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
 Array: TypeAlias = npt.NDArray[np.float64]
 
 UNEXPLAINED_SPREAD = Status.KIND_CONTRADICTED
+
+OTHER_BY, OTHER, SOMEWHERE = 2.0, 0.02, 0.1
+"""Elements are others beside a term where they move by so many errors and by this part of themselves, at this part of the samples."""
 
 
 class MergedIdentification(Oscillating, Reported):
@@ -145,12 +148,29 @@ class MergedIdentification(Oscillating, Reported):
             self.status |= np.uint16(Status.INVALID | Status.RANK_DEFICIENT)
             flags |= int(Status.RANK_DEFICIENT)
         self.record_status = Status(flags)
+        if merging.lacking is not None:
+            self._hold(merging.lacking)
         self.settings = self._settings()
         self.scans = tuple(scan_of(part.found.scan, part.names) for part in merging.parts if part.found.scan.tried)
         self.derive()
         if wrong_inertia(self, merging):
             # No machine has that: something else was told from it badly.
             self.record_status |= Status.ILL_CONDITIONED
+
+    def _hold(self, lacking: LackingTerms) -> None:
+        """Make errors hold what missing terms change, and trust nothing that they move."""
+        self.record_status |= Status.TERM_SUSPECTED
+        for name, change in lacking.changes.items():
+            if self.kinds[name] in {"known", "unknown"}:
+                continue
+            values, errors = self.elements[name], self.stderr[name]
+            there = np.isfinite(values) & np.isfinite(errors)
+            is_other = (change > OTHER_BY * errors) & (change > OTHER * np.abs(values)) & there
+            if there.any() and np.mean(is_other[there]) > SOMEWHERE:
+                self.status |= np.uint16(Status.NOISE_MODEL)
+            self.stderr[name] = np.hypot(errors, change)
+            if name in self.constants:
+                self.constants[name] = (self.constants[name][0], float(np.median(self.stderr[name])))
 
     @classmethod
     def of_known(cls, merging: Merging, known: Mapping[str, Any]) -> MergedIdentification:
@@ -418,3 +438,13 @@ class MergedIdentification(Oscillating, Reported):
 
     def _repr_html_(self) -> str:
         return as_html(self, whose(self._merging.trials, max(self._merging.masses, 1)))
+
+
+def parts_of_result(found: MergedIdentification) -> Sequence[Part]:
+    """Return what every call of the core found."""
+    return found._merging.parts  # noqa: SLF001 - of this file
+
+
+def that_lacks(found: MergedIdentification, what: LackingTerms) -> MergedIdentification:
+    """Return a result that says what it lacks, and whose errors hold what that changes."""
+    return MergedIdentification(replace(found._merging, lacking=what))  # noqa: SLF001 - of this file

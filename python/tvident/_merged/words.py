@@ -13,6 +13,7 @@ from tvident._equation import BUILT_IN
 from tvident._files import aligned
 from tvident._merged.expanded import FoundExpanded
 from tvident._merged.merging import Merging, Part
+from tvident._merged.structure import Link
 from tvident._results import COLUMNS, Words, row_of, sentences_of
 from tvident._status import Status, describe
 from tvident._units import in_words_of
@@ -51,6 +52,7 @@ def words_of(result: Any, merging: Merging, scatter: Mapping[str, float]) -> Wor
         advice += [_SILENT] if one.misfit > 1 else []
         advice += _channels_of(part, merging.masses, sampling.period)
         advice += _lacking_terms(part, merging)
+    advice += _lacking_between(merging)
     advice += _changing(result)
     reasons += _tested(result)
     reasons += _slow(merging)
@@ -127,7 +129,7 @@ def _tested(result: Any) -> list[str]:
 
 def _channels_of(part: Part, masses: int, period: float) -> list[str]:
     """Return what to do about channels that a recorder spoilt, that are late, or whose gain is wrong."""
-    numbers, found, angles = part.equations.numbers, part.found, _angles_of(part)
+    numbers, found, angles = part.equations.numbers, part.found, angles_of(part)
     words = []
     for one in found.defects:
         cure = held(one.amount, "all") if one.name == "held" else spoilt(one.name, one.amount, alone=False)
@@ -155,7 +157,7 @@ def _lacking_terms(part: Part, merging: Merging) -> list[str]:
     terms = dict.fromkeys([*merging.terms, *(name for _, against, name, _ in suspected if against is None)])
     kinds = merging.kinds_of_terms
     of_masses = [(term, kinds[term]) if term in kinds else term for term in terms]
-    links = [_link(_angles_of(part), mass, against, merging.masses) for mass, against, _, _ in suspected]
+    links = [link_of(angles_of(part), mass, against, merging.masses) for mass, against, _, _ in suspected]
     of_joints = [(name, link) for (_, _, name, _), link in zip(suspected, links, strict=True) if link is not None]
     given = [] if merging.recorded is None else list(getattr(merging.recorded.structure, "terms", ()))
     for (mass, _, name, found), link in zip(suspected, links, strict=True):
@@ -171,13 +173,26 @@ def _lacking_terms(part: Part, merging: Merging) -> list[str]:
     return words
 
 
-def _angles_of(part: Part) -> list[int]:
+def _lacking_between(merging: Merging) -> list[str]:
+    """Return which terms were found to be missing by trying them."""
+    if merging.lacking is None:
+        return []
+    given = [] if merging.recorded is None else list(merging.recorded.structure.terms)
+    terms = [*given, *((one.name, one.link) for one in merging.lacking.terms)]
+    words = []
+    for one in merging.lacking.terms:
+        says = BUILT_IN[one.name].suspected(one.value, f"{one.value:.3g} ± {one.stderr:.1g} {merging.units[one.name]}")
+        words.append(f"between {_ends(one.link)}: {says}: give structure=tvident.Chain(…, terms={terms})")
+    return words
+
+
+def angles_of(part: Part) -> list[int]:
     """Return whose angles a part counts: those of its equations first, then all others."""
     numbers = part.equations.numbers
     return [*numbers, *(one for one in range(len(part.found.noise[0])) if one not in numbers)]
 
 
-def _link(channels: Sequence[int], mass: int, against: int | None, masses: int) -> tuple[int | str, int] | None:
+def link_of(channels: Sequence[int], mass: int, against: int | None, masses: int) -> Link | None:
     """Return what a term acts between, as a chain has it; None for a mass on its own."""
     if against is None:
         return None
@@ -187,7 +202,7 @@ def _link(channels: Sequence[int], mass: int, against: int | None, masses: int) 
     return min(one, other), max(one, other)
 
 
-def _ends(link: tuple[int | str, int]) -> str:
+def _ends(link: Link) -> str:
     """Return what a term acts between, in words."""
     one, other = link
     return f"the base and mass {other}" if one == "base" else f"masses {one} and {other}"
