@@ -30,6 +30,9 @@ _WINDOWS = 4
 _BLOCKS = 14
 """Blocks that the longest trial has at least."""
 
+_AT_ONCE = 4096
+"""Equations whose samples are copied at once."""
+
 _EACH = 8
 """Equations for each length of a test function."""
 
@@ -181,4 +184,8 @@ def _averages(values: Any, kernels: Array, stride: int) -> Array:
     # A mean that is not zero would cost digits.
     mean = float(there.mean())
     samples = np.lib.stride_tricks.sliding_window_view(there - mean, kernels.shape[1])[::stride]
-    return np.asarray((samples @ kernels.T + mean * kernels.sum(axis=1)).T)
+    found = np.empty((len(kernels), len(samples)))
+    for first in range(0, len(samples), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        found[:, some] = kernels @ samples[some].T
+    return np.asarray(found + mean * kernels.sum(axis=1, keepdims=True), np.float64)
