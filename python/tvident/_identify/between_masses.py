@@ -29,6 +29,9 @@ from tvident._merged import (
 )
 from tvident._status import Status
 
+_NO_WORSE = 2.0
+"""Times the error of prediction that a chain with more terms has at most: each is over the noise of another test function."""
+
 _MOST = 3
 """Terms that are tried in full at most."""
 
@@ -120,7 +123,7 @@ class _ChainTried:
         return [(name, link or ("base", mass)) for name, link, mass in each]
 
     def _with(self, terms: Sequence[Acting]) -> _Better | None:
-        """Return what a chain with more terms changes; None where they are not there."""
+        """Return what a chain with more terms changes; None where they are not there, or predict far worse."""
         structure: Any = self.masses[0].structure
         more = replace(structure, terms=[*structure.terms, *terms])
         asked = replace(self.asked, report=None)
@@ -137,7 +140,10 @@ class _ChainTried:
             if not abs(value) > BEYOND_CHANCE * error or (value < 0 and BUILT_IN[name].dissipates):
                 return None
             told.append(LackingTerm(name, link, value, error))
+        error, before = (one.settings["prediction_error"][0] for one in (found, self.found))
+        if not error <= _NO_WORSE * before:
+            return None
         changes = {
             name: np.abs(np.nan_to_num(found.elements[name] - values)) for name, values in self.found.elements.items()
         }
-        return _Better(LackingTerms(told, changes), found.settings["prediction_error"][0])
+        return _Better(LackingTerms(told, changes), error)
