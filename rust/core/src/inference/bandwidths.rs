@@ -12,21 +12,29 @@ pub(crate) fn within(hole: f64, whole: f64) -> Vec<f64> {
 }
 
 /// Tries bandwidths in ascending order, or outward from the last round's in both directions until they get no better.
-pub(crate) fn outward(reaches: &[f64], last: Option<f64>, mut is_better: impl FnMut(f64) -> bool) {
+///
+/// # Errors
+/// Those of a try.
+pub(crate) fn outward<E>(
+    reaches: &[f64],
+    last: Option<f64>,
+    mut is_better: impl FnMut(f64) -> Result<bool, E>,
+) -> Result<(), E> {
     let most = if last.is_some() { NO_BETTER } else { usize::MAX };
     let last = last.unwrap_or(f64::NEG_INFINITY);
     let (below, above) = reaches.split_at(reaches.partition_point(|&reach| reach < last));
     let mut walk = |reaches: &mut dyn Iterator<Item = &f64>| {
         let mut worse = 0;
         for &reach in reaches {
-            worse = if is_better(reach) { 0 } else { worse + 1 };
+            worse = if is_better(reach)? { 0 } else { worse + 1 };
             if worse == most {
-                return;
+                break;
             }
         }
+        Ok(())
     };
-    walk(&mut above.iter());
-    walk(&mut below.iter().rev());
+    walk(&mut above.iter())?;
+    walk(&mut below.iter().rev())
 }
 
 #[cfg(test)]
@@ -35,18 +43,17 @@ mod tests {
 
     #[test]
     fn the_search_around_a_bandwidth_ends_where_it_gets_no_better() {
-        let mut tried = Vec::new();
-        outward(&REACHES, Some(5.0), |reach| {
-            tried.push(reach);
-            reach == 8.0
-        });
-        assert_eq!(tried, [5.6, 8.0, 11.0, 16.0, 4.0, 2.8]);
-        tried.clear();
-        outward(&REACHES, None, |reach| {
-            tried.push(reach);
-            false
-        });
-        assert_eq!(tried, REACHES);
+        let tried = |last: Option<f64>, best: f64| {
+            let mut tried = Vec::new();
+            let found: Result<(), ()> = outward(&REACHES, last, |reach| {
+                tried.push(reach);
+                Ok(reach == best)
+            });
+            found.map(|()| tried)
+        };
+        assert_eq!(tried(Some(5.0), 8.0).as_deref(), Ok(&[5.6, 8.0, 11.0, 16.0, 4.0, 2.8][..]));
+        assert_eq!(tried(None, 0.0).as_deref(), Ok(&REACHES[..]));
+        assert_eq!(outward(&REACHES, None, |reach| if reach > 2.5 { Err(reach) } else { Ok(false) }), Err(2.8));
     }
 
     #[test]

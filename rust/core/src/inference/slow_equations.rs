@@ -3,6 +3,8 @@
 
 use std::ops::Range;
 
+use crate::error::Error;
+use crate::exec::stages::Stages;
 use crate::inference::slow_curve::Varying;
 use crate::inference::slow_points::{DENSITY, Points};
 use crate::inference::slow_triangles::Triangles;
@@ -13,7 +15,6 @@ use crate::regression::solved::{Solved, is_determined};
 use crate::regression::subsample::rows_all_over;
 use crate::regression::window_length::Scale;
 use crate::simd::instructions::Instructions;
-use crate::simd::vectors::dispatch;
 
 /// Coefficients of the polynomials in time.
 pub(crate) const QUADRATIC: usize = 3;
@@ -53,24 +54,25 @@ impl Slow<'_> {
         terms: usize,
         (reach, hole): (f64, f64),
         instructions: Instructions,
-    ) -> Option<[Varying; 2]> {
+        stages: &mut Stages<'_, '_>,
+    ) -> Result<Option<[Varying; 2]>, Error> {
         let spacing = reach / DENSITY as f64;
         let stretches: Vec<Range<usize>> = self.stretches().collect();
-        let solve = |(rows, equations): (&Range<usize>, &Triangles)| {
+        let mut solve = |(rows, equations): (&Range<usize>, &Triangles)| {
             let last = rows.len() as f64 - 1.0;
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "points of a record")]
             let count = (last.max(0.0) / spacing).ceil() as usize + 1;
             let (coefficients, start) = (self.coefficients, rows.start);
-            dispatch(instructions, Points { equations, coefficients, terms, start, reach, hole, count })
+            Points { equations, coefficients, terms, start, reach, hole, count }.solved(instructions, stages)
         };
-        let solved: Vec<[Solved; 2]> = stretches.iter().zip(equations).map(solve).collect();
+        let solved: Vec<[Solved; 2]> = stretches.iter().zip(equations).map(&mut solve).collect::<Result<_, Error>>()?;
         let starts = solved.iter().scan(0, |next, [one, _]| Some(std::mem::replace(next, *next + one.len())));
         let starts: Vec<_> = stretches.iter().map(|rows| rows.start as f64).zip(starts).collect();
         let curve = |which: usize| {
             let solved = Solved::join(&solved.iter().map(|both| &both[which]).collect::<Vec<_>>());
             self.curve(&solved, terms, (spacing, starts.clone()), instructions)
         };
-        Some([curve(0)?, curve(1)?])
+        Ok(curve(0).zip(curve(1)).map(|(without, with)| [without, with]))
     }
 
     /// The curves through solved points.
@@ -325,8 +327,9 @@ mod tests {
         let companions = vec![rows.regressors[1].companion.as_slice()];
         let slow =
             Slow { fit: &fit, coefficients: 1, companions, current: None, weights: &ones, rows: ROWS, breaks: &[] };
-        let [without, with] =
-            slow.fit(&slow.equations(&problem), QUADRATIC, (reach, hole), Instructions::Scalar).expect("curves");
+        let equations = slow.equations(&problem);
+        let fitted = staged(|stages| slow.fit(&equations, QUADRATIC, (reach, hole), Instructions::Scalar, stages));
+        let [without, with] = fitted.expect("curves");
         if hole > 0.0 { without } else { with }
     }
 

@@ -1,5 +1,10 @@
 //! Local polynomials in time fitted to equations around many points, with and without those near each.
 
+use std::ops::Range;
+
+use crate::error::Error;
+use crate::exec::pool::Piece;
+use crate::exec::stages::Stages;
 use crate::inference::slow_triangles::Triangles;
 use crate::regression::layout::{Fields, Layout};
 use crate::regression::noise_correction::RowNoise;
@@ -7,7 +12,8 @@ use crate::regression::solve::{SolveScratch, solve};
 use crate::regression::solved::Solved;
 use crate::regression::summary::{absorb, merge};
 use crate::simd::f64x8::{Packet, WIDTH};
-use crate::simd::vectors::{Kernel, Lanes};
+use crate::simd::instructions::Instructions;
+use crate::simd::vectors::{Kernel, Lanes, dispatch};
 
 /// Points within one bandwidth.
 pub(crate) const DENSITY: usize = 8;
@@ -18,7 +24,10 @@ const AT_A_TIME: usize = 6;
 /// One coefficient as a parabola beside two constants, the most frequent layout: the compiler unrolls its loops.
 const BESIDE_TWO: Layout = Layout { windowed: 3, linear: false, constant: 2 };
 
-/// The kernel: eight points at a time, each with the equations around it. Returns them without equations nearer than the hole, and with all.
+/// Eights of points that are solved at a time.
+const PIECE: usize = 64;
+
+/// Points of a stretch, each with the equations around it.
 pub(crate) struct Points<'a> {
     /// The equations of the stretch that they lie in, of which so many coefficients are slow.
     pub(crate) equations: &'a Triangles,
@@ -32,39 +41,72 @@ pub(crate) struct Points<'a> {
     pub(crate) count: usize,
 }
 
-impl Kernel for Points<'_> {
-    type Output = [Solved; 2];
+/// The kernel: some eights of them. Returns their fields without equations nearer than the hole, and with all.
+struct Eights<'a> {
+    points: &'a Points<'a>,
+    which: Range<usize>,
+}
+
+impl Kernel for Eights<'_> {
+    type Output = [Vec<Packet>; 2];
 
     #[inline(always)]
-    fn run<S: Lanes>(self, _simd: S) -> [Solved; 2] {
-        let constant = self.equations.unknowns - self.coefficients;
-        let layout = Layout { windowed: self.terms * self.coefficients, linear: false, constant };
-        if layout == BESIDE_TWO && self.coefficients == 1 && S::F64_LANES > 1 {
-            self.solve::<S>(BESIDE_TWO, 1, 3)
+    fn run<S: Lanes>(self, _simd: S) -> [Vec<Packet>; 2] {
+        let Self { points, which } = self;
+        let layout = points.layout();
+        if layout == BESIDE_TWO && points.coefficients == 1 && S::F64_LANES > 1 {
+            points.solve::<S>(BESIDE_TWO, (1, 3), which)
         } else {
-            let (coefficients, terms) = (self.coefficients, self.terms);
-            self.solve::<S>(layout, coefficients, terms)
+            points.solve::<S>(layout, (points.coefficients, points.terms), which)
         }
     }
 }
 
 impl Points<'_> {
-    #[inline(always)]
-    fn solve<S: Lanes>(self, layout: Layout, slow: usize, terms: usize) -> [Solved; 2] {
-        let noise = RowNoise::new(&vec![[].as_slice(); 2 * layout.windowed + layout.constant + 1], 0.0);
+    fn layout(&self) -> Layout {
+        let constant = self.equations.unknowns - self.coefficients;
+        Layout { windowed: self.terms * self.coefficients, linear: false, constant }
+    }
+
+    /// Points side by side lie so far apart: each sees equations of its own, and none that another sees alone.
+    fn apart(&self) -> usize {
+        self.count.div_ceil(WIDTH)
+    }
+
+    /// Solves all of them, in parallel: without equations nearer than the hole, and with all.
+    pub(crate) fn solved(&self, instructions: Instructions, stages: &mut Stages<'_, '_>) -> Result<[Solved; 2], Error> {
+        let (layout, apart) = (self.layout(), self.apart());
+        let pieces = (0..apart).step_by(PIECE).map(|first| first..apart.min(first + PIECE));
+        let pieces: Vec<_> = pieces.map(|which| Piece { size: which.len(), content: which }).collect();
+        let firsts: Vec<usize> = pieces.iter().map(|piece| piece.content.start).collect();
+        let solve = |which: Range<usize>, (): &mut ()| dispatch(instructions, Eights { points: self, which });
+        let found = stages.map(pieces, || (), solve)?;
+        let size = Fields { layout }.size();
         let mut solved = [Solved::new(layout, 0, self.count), Solved::new(layout, 0, self.count)];
+        for (first, both) in firsts.into_iter().zip(&found) {
+            for (solved, fields) in solved.iter_mut().zip(both) {
+                let eights = fields.chunks_exact(size).zip(first..);
+                eights.for_each(|(fields, place)| solved.put_apart(place, apart, fields));
+            }
+        }
+        Ok(solved)
+    }
+
+    #[inline(always)]
+    fn solve<S: Lanes>(&self, layout: Layout, (slow, terms): (usize, usize), which: Range<usize>) -> [Vec<Packet>; 2] {
+        let noise = RowNoise::new(&vec![[].as_slice(); 2 * layout.windowed + layout.constant + 1], 0.0);
+        let size = Fields { layout }.size();
+        let mut solved = [(); 2].map(|()| Vec::with_capacity(which.len() * size));
         let mut scratch = SolveScratch::new(layout);
         let mut sides = [Side::new(layout), Side::new(layout)];
         let mut merged = vec![Packet::ZERO; layout.columns() * layout.columns()];
-        let mut fields = vec![Packet::ZERO; Fields { layout }.size()];
-        // Points side by side lie far apart: each sees equations of its own, and none that another sees alone.
-        let apart = self.count.div_ceil(WIDTH);
-        for first in 0..apart {
+        let mut fields = vec![Packet::ZERO; size];
+        for first in which {
             sides.iter_mut().for_each(Side::clear);
-            let nearby = AroundPoints::new(&self, first, apart);
+            let nearby = AroundPoints::new(self, first, self.apart());
             // Every part is called from one place: each is long, and compiled wherever it is called.
             for step in 0..=nearby.steps {
-                let seen = nearby.seen(&self, step);
+                let seen = nearby.seen(self, step);
                 for (side, weight) in sides.iter_mut().zip(seen.weights) {
                     if weight != Packet::ZERO {
                         side.push((layout, slow, terms), self.equations, &seen, weight);
@@ -81,7 +123,7 @@ impl Points<'_> {
                     merge(layout, &mut outside.summary, &inside.summary, 0.0, &mut merged);
                 }
                 solve(layout, &outside.summary, &noise, Some(1.0), &mut scratch, &mut fields);
-                solved.put_apart(first, apart, &fields);
+                solved.extend_from_slice(&fields);
             }
         }
         solved
@@ -203,10 +245,8 @@ impl Side {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::regression::simulated::{assert_near, random};
+    use crate::regression::simulated::{assert_near, random, staged};
     use crate::regression::solved::{is_determined, local};
-    use crate::simd::instructions::Instructions;
-    use crate::simd::vectors::dispatch;
 
     const EQUATIONS: usize = 300;
     /// Triangles of some hundred equations, six at a time.
@@ -238,7 +278,7 @@ mod tests {
 
     fn solved(equations: &Triangles, hole: f64, instructions: Instructions) -> [Solved; 2] {
         let points = Points { equations, coefficients: 1, terms: 3, start: 0, reach: 80.0, hole, count: 61 };
-        dispatch(instructions, points)
+        staged(|stages| points.solved(instructions, stages))
     }
 
     #[test]
@@ -276,6 +316,21 @@ mod tests {
             let near = |one: &Solved| local(one, point, &[1.0, 2.0], 0);
             assert_near(near(&all), near(&with), ROUNDING);
             assert_near(near(&all), near(&nothing_left_out), ROUNDING);
+        }
+    }
+
+    #[test]
+    fn every_point_of_many_is_where_it_belongs() {
+        let found = equations(2, 0.0);
+        // More points than are solved at a time, one a row.
+        let count = 601;
+        assert!(count > WIDTH * PIECE);
+        let points = Points { equations: &found, coefficients: 1, terms: 3, start: 0, reach: 8.0, hole: 0.0, count };
+        let [_, all] = staged(|stages| points.solved(Instructions::Scalar, stages));
+        let determined: Vec<usize> = (0..count).filter(|&point| is_determined(&all, point)).collect();
+        assert!(determined.len() > count / 2);
+        for point in determined {
+            assert_near(local(&all, point, &[1.0, 2.0], 0), parabola(point as f64), 100.0 * ROUNDING);
         }
     }
 

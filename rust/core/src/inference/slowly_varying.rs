@@ -26,7 +26,7 @@ use crate::simd::instructions::Instructions;
 
 /// The part of the record, or of its shortest stretch between jumps, that windows span at most: one whose parts are told to differ is followed
 /// from part to part.
-const STRETCH: usize = BLOCKS;
+pub(crate) const STRETCH: usize = BLOCKS;
 
 /// Rounds of estimating the slow coefficients, each starting from the last one's result.
 const ROUNDS: usize = 3;
@@ -137,17 +137,18 @@ impl SlowSearch<'_> {
         problem: &Problem<'_>,
         (scale, compares): (Scale, bool),
         (reaches, last): (&[f64], Option<f64>),
-    ) -> Option<BestCurve> {
+        stages: &mut Stages<'_, '_>,
+    ) -> Result<Option<BestCurve>, Error> {
         let &Self { expected, simpler, instructions, .. } = self;
         let triangles = equations.equations(problem);
         let mut best: Option<BestCurve> = None;
         let mut least = f64::INFINITY;
-        let mut consider = |terms: usize, reach: f64| {
+        let mut consider = |terms: usize, reach: f64| -> Result<bool, Error> {
             if best.is_some() && !compares {
-                return false;
+                return Ok(false);
             }
-            let fitted = equations.fit(&triangles, terms, (reach, hole(scale)), instructions);
-            let Some(curves) = fitted else { return false };
+            let fitted = equations.fit(&triangles, terms, (reach, hole(scale)), instructions, stages)?;
+            let Some(curves) = fitted else { return Ok(false) };
             let Prediction { error, excess } = equations.error(problem, &curves[0], &curves[1], scale, expected);
             let counts = if terms == 1 { simpler * error } else { error };
             let is_better = best.is_none() || counts < least;
@@ -155,14 +156,14 @@ impl SlowSearch<'_> {
                 least = counts;
                 best = Some(BestCurve { terms, curves, reach, excess });
             }
-            is_better
+            Ok(is_better)
         };
-        outward(reaches, last, |reach| consider(QUADRATIC, reach));
+        outward(reaches, last, |reach| consider(QUADRATIC, reach))?;
         // Between jumps a coefficient may be constant.
         if !self.breaks.is_empty() {
-            consider(1, 2.0 * self.rows.len() as f64);
+            consider(1, 2.0 * self.rows.len() as f64)?;
         }
-        best
+        Ok(best)
     }
 }
 
@@ -211,7 +212,7 @@ pub(crate) fn find(
         let companions = slow.iter().map(|&one| rows.regressors[one].companion.as_slice()).collect();
         let equations = Slow { fit: &fit, coefficients, companions, current, weights, rows: rows.len(), breaks };
         let reaches = within(hole(scale), whole);
-        let best = search.best_curve(&equations, &problem, (scale, compares), (&reaches, last));
+        let best = search.best_curve(&equations, &problem, (scale, compares), (&reaches, last), stages)?;
         let Some(BestCurve { terms, curves: [leave_gap_out, varying], reach, excess }) = best else { return Ok(None) };
         let reach = reach.min(whole / 2.0);
         last = (terms > 1).then_some(reach);
@@ -277,7 +278,8 @@ pub(crate) fn followed(
     let (rows, breaks) = (rows.len(), found.varying.breaks());
     let equations =
         Slow { fit: &fit, coefficients, companions, current: None, weights: &weights, rows, breaks: &breaks };
-    let fitted = equations.fit(&equations.equations(&problem), found.terms, (found.reach, hole(scale)), instructions);
+    let equations_of = equations.equations(&problem);
+    let fitted = equations.fit(&equations_of, found.terms, (found.reach, hole(scale)), instructions, stages)?;
     Ok(fitted.map(|[_, full]| full))
 }
 
