@@ -1,5 +1,7 @@
 //! The choice of the test function, from the spectra of the channels and the parameters of a first fit.
 
+use std::borrow::Cow;
+
 use crate::equation::motion::Coefficient;
 use crate::error::Error;
 use crate::identify::options::WidthFrom;
@@ -9,7 +11,7 @@ use crate::noise::spectrum::power_in_pieces;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
-use crate::regression::subsample::stretches_of_blocks;
+use crate::regression::subsample::{stretches_of_blocks, stretches_of_rows, thinned_rows};
 use crate::regression::window_length::Scale;
 use crate::weak_form::coverage::Usable;
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
@@ -29,6 +31,7 @@ const PART_OF_A_CYCLE: usize = 8;
 /// Rounds of choosing the test function and estimating what the choice depends on.
 const ROUNDS: usize = 6;
 /// Rows with the test function that was chosen.
+#[derive(Clone)]
 pub(crate) struct Chosen {
     pub(crate) weak: WeakRows,
     /// Inertia, damping and stiffness, about.
@@ -50,10 +53,12 @@ impl Chosen {
 }
 
 impl Session<'_, '_, '_> {
-    /// A first estimate, in windows of a few test functions.
+    /// A first estimate, in windows of a few test functions. Stretches of many rows tell enough.
     pub(crate) fn pilot(&mut self, weak: &WeakRows, model: &Model) -> Result<[f64; 3], Error> {
-        let problem = model.problem(&weak.rows, &weak.rows.rhs, self.noise[0], None);
-        let scales = Scale::all(weak.rows.len(), weak.reach());
+        let some = stretches_of_rows(weak.rows.len()).filter(|_| !model.windowed.is_empty());
+        let rows = some.map_or(Cow::Borrowed(&weak.rows), |some| Cow::Owned(thinned_rows(&weak.rows, &some)));
+        let problem = model.problem(&rows, &rows.rhs, self.noise[0], None);
+        let scales = Scale::all(rows.len(), weak.reach());
         let wanted = PILOT_WINDOW * weak.function.half_width() / weak.stride;
         let scale = if model.windowed.is_empty() {
             None

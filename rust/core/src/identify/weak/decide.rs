@@ -93,11 +93,12 @@ impl Session<'_, '_, '_> {
         }
     }
 
-    /// Fits again what was fitted before something moved that changes the best length of windows by little, if at all. Returns the fit before.
+    /// Fits again what was fitted before something moved that changes the best length of windows by little, if at all. Returns the fit before. Both may
+    /// be sketches.
     pub(crate) fn fit_near(&mut self, chosen: &mut Chosen, model: &Model) -> Result<Option<Decided>, Error> {
         self.best_before = chosen.best_windows();
         let before = chosen.fitted.take();
-        let fitted = self.fit_first(chosen, model);
+        let fitted = self.sketch_first(chosen, model);
         self.best_before = None;
         chosen.fitted = Some(fitted?);
         Ok(before)
@@ -105,6 +106,13 @@ impl Session<'_, '_, '_> {
 
     /// Fits everything that is not windowed as constant, in windows of the length that predicts best where it is not given.
     pub(crate) fn fit_first(&mut self, chosen: &Chosen, model: &Model) -> Result<Decided, Error> {
+        let mut decided = self.sketch_first(chosen, model)?;
+        self.complete(&chosen.weak, &mut decided)?;
+        Ok(decided)
+    }
+
+    /// The same, of many rows only as far as it tells which windows are best and how well they predict.
+    pub(crate) fn sketch_first(&mut self, chosen: &Chosen, model: &Model) -> Result<Decided, Error> {
         let rows = &chosen.weak.rows;
         let (covariance, expected) = self.covariance(&chosen.weak, chosen.parameters);
         let mut decided = Decided {
@@ -112,6 +120,7 @@ impl Session<'_, '_, '_> {
             slow: Vec::new(),
             found: None,
             fit: None,
+            is_sketch: false,
             first: None,
             longest: None,
             near: None,
@@ -137,9 +146,16 @@ impl Session<'_, '_, '_> {
 
     /// The fit that was made with a test function, or else the first.
     pub(crate) fn take_fitted(&mut self, chosen: &mut Chosen, model: &Model) -> Result<Decided, Error> {
+        let mut fitted = self.take_sketch(chosen, model)?;
+        self.complete(&chosen.weak, &mut fitted)?;
+        Ok(fitted)
+    }
+
+    /// The same, which may be a sketch.
+    pub(crate) fn take_sketch(&mut self, chosen: &mut Chosen, model: &Model) -> Result<Decided, Error> {
         match chosen.fitted.take() {
             Some(fitted) => Ok(fitted),
-            None => self.fit_first(chosen, model),
+            None => self.sketch_first(chosen, model),
         }
     }
 

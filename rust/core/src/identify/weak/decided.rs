@@ -28,6 +28,8 @@ pub(crate) struct Decided {
     pub(crate) found: Option<slowly_varying::SlowCoefficients>,
     /// `None` if the constants are not determined.
     pub(crate) fit: Option<Fit>,
+    /// Whether the fit is one of the rows that compared windows: enough to tell which are best, and how well they predict.
+    pub(crate) is_sketch: bool,
     /// The length of windows that predicts best while nothing varies slowly. The search for what varies begins there: windows that were chosen while
     /// too little was free are so short that nothing else is found from them.
     pub(crate) first: Option<Scale>,

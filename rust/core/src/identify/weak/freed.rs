@@ -1,6 +1,7 @@
 //! Setting constants free: those that grow, that swing, or that all change beside one that does.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use crate::equation::rows::Rows;
 use crate::error::Error;
@@ -9,6 +10,7 @@ use crate::identify::weak::decide::{BADLY, BETTER};
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
 use crate::inference::constancy::Test;
+use crate::inference::cross_validation::best_length;
 use crate::inference::part_constants::TestNoise;
 use crate::inference::short_parts::{LEFT_OF_SWINGS, MORE_THAN_NOISE, Swinging, swinging};
 use crate::inference::slowly_varying;
@@ -16,6 +18,8 @@ use crate::regression::fit::Fit;
 use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
 use crate::regression::residuals::residuals;
+use crate::regression::subsample::{holds, places_of, stretches_of_rows, thinned_rows};
+use crate::regression::window_length::Scale;
 use crate::weak_form::weak_rows::WeakRows;
 
 /// The part of the mean squared error of predicting rows that must be left where no test of parts says that anything changes.
@@ -60,6 +64,9 @@ impl Session<'_, '_, '_> {
         let swinging = decided.model.constant[constant];
         let is_open = self.undecided().contains(&swinging);
         let rows = if is_open { Cow::Borrowed(rows) } else { Cow::Owned(without_rate(rows, swinging)) };
+        if self.is_hopeless(&rows, model, decided, swinging)? {
+            return Ok(false);
+        }
         let hopeless = 1.0 + HOPELESS * (decided.error - 1.0).max(0.0);
         let free = self.freed(&rows, model, decided, (swinging, hopeless))?;
         let is_settled = free.error - 1.0 < LEFT_OF_SWINGS * (decided.error - 1.0);
@@ -87,6 +94,7 @@ impl Session<'_, '_, '_> {
         let mut free = Decided { model, white: None, correlated: None, ..decided.clone() };
         (free.covariance, free.expected) = self.covariance(weak, parameters);
         self.fit_constants(weak, &mut free)?;
+        self.complete(weak, &mut free)?;
         Ok(Some(free).filter(|free| free.fit.is_some()))
     }
 
@@ -167,6 +175,41 @@ impl Session<'_, '_, '_> {
             free.error = f64::INFINITY;
         }
         Ok(free)
+    }
+
+    /// Whether stretches of a long record say that it is not worth following a constant along all of it: even a curve of its own in each leaves too much of
+    /// what noise does not explain. Only where windows are short, as they are that follow what is missing: stretches hold many of them.
+    fn is_hopeless(&mut self, rows: &Rows, model: &Model, decided: &Decided, one: usize) -> Result<bool, Error> {
+        let (Some(stretches), Some(first)) = (stretches_of_rows(rows.len()), decided.first) else { return Ok(false) };
+        let length = stretches.first().map_or(0, Range::len);
+        if first.span() * slowly_varying::STRETCH > length {
+            return Ok(false);
+        }
+        let some = thinned_rows(rows, &stretches);
+        let scales: Vec<Scale> = decided.scales.iter().copied().filter(|&scale| holds(scale)).collect();
+        let (noise, expected, instructions) = (self.noise[0], decided.expected, self.options.instructions);
+        let problem = decided.model.problem(&some, &some.rhs, noise, None);
+        let before = best_length(&problem, (&scales, &[first]), expected, instructions, &mut self.stages)?;
+        let Some((_, before)) = before else { return Ok(false) };
+        let others = decided.model.constant.iter().copied().filter(|&other| other != one);
+        let model = Model { constant: std::iter::once(one).chain(others).collect(), ..model.clone() };
+        let starts: Vec<usize> = places_of(&stretches).iter().skip(1).map(|place| place.start).collect();
+        let search = slowly_varying::SlowSearch {
+            rows: &some,
+            model: &model,
+            coefficients: 1,
+            scales: &scales,
+            longest: decided.longest.map(|longest| longest.min(length)),
+            breaks: &starts,
+            ..self.slow_search(rows, &model, decided)
+        };
+        let mut left = slowly_varying::find(&search, first, &mut self.stages)?.map_or(0.0, |found| found.error);
+        if !rows.jumps.is_empty() {
+            let jumping = slowly_varying::SlowSearch { breaks: &some.jumps, ..search };
+            let found = slowly_varying::find(&jumping, first, &mut self.stages)?;
+            left = left.min(found.map_or(0.0, |found| found.error));
+        }
+        Ok(left - 1.0 > HOPELESS * (before - 1.0))
     }
 
     /// The undecided constant that seems to grow most along the record.

@@ -88,11 +88,16 @@ impl Session<'_, '_, '_> {
         if !decides || model.windowed != [STIFFNESS] {
             return Ok(Vec::new());
         }
+        let sketch = self.take_sketch(chosen, model)?;
+        let (error, expected) = (sketch.error, sketch.expected);
+        chosen.fitted = Some(sketch);
+        if error > NOISE_MODEL_FAILS {
+            return Ok(known.to_vec());
+        }
         let fitted = self.take_fitted(chosen, model)?;
         let left = self.left_of_all_rows(&chosen.weak, &chosen.weak.rows.usable, &fitted)?;
-        let (error, expected) = (fitted.error, fitted.expected);
         chosen.fitted = Some(fitted);
-        let Some(mut left) = left.filter(|_| error <= NOISE_MODEL_FAILS) else { return Ok(known.to_vec()) };
+        let Some(mut left) = left else { return Ok(known.to_vec()) };
         let added = if known.is_empty() { None } else { self.better_by(chosen, model, (torque, error))? };
         let Some(added) = added.or(known.is_empty().then(Vec::new)) else { return Ok(Vec::new()) };
         left.add(&added);

@@ -93,7 +93,7 @@ impl Session<'_, '_, '_> {
             let shortest = if let Some(fitted) = before.and_then(|before| before.fitted.as_ref()) {
                 fitted.has_shortest_windows()
             } else {
-                let fitted = self.fit_first(&tried, model)?;
+                let fitted = self.sketch_first(&tried, model)?;
                 let shortest = fitted.has_shortest_windows();
                 tried.fitted = Some(fitted);
                 shortest
@@ -119,7 +119,7 @@ impl Session<'_, '_, '_> {
         let (mut best, mut is_wider) = (tried, false);
         while error > BADLY && !self.scan.has_no_plateau() && width <= widest {
             let mut wider = self.chosen_with(width, model)?;
-            let fitted = self.fit_first(&wider, model)?;
+            let fitted = self.sketch_first(&wider, model)?;
             if fitted.error < BETTER * error {
                 (error, wider.fitted) = (fitted.error, Some(fitted));
                 (best, is_wider) = (wider, true);

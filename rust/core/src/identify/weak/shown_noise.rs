@@ -8,6 +8,8 @@
 //! A drive of steps or random signs reaches the highest frequencies, where it is read as noise, and angles without noise hold what it moves there.
 //! The equations leave far less then, and no noise makes more than what they leave.
 
+use std::ops::Range;
+
 use crate::error::Error;
 use crate::identify::scanned::Scans;
 use crate::identify::weak::choice::Chosen;
@@ -23,6 +25,7 @@ use crate::regression::model::Model;
 use crate::regression::problem::Problem;
 use crate::regression::residuals::{residuals, usual_variance};
 use crate::regression::row_covariance::RowCovariance;
+use crate::regression::subsample::more_stretches_of_rows;
 use crate::regression::window_length::Scale;
 use crate::weak_form::weak_rows::WeakRows;
 
@@ -100,7 +103,7 @@ impl Session<'_, '_, '_> {
         if self.options.noise[1].is_some() {
             return Ok(false);
         }
-        let fitted = self.take_fitted(chosen, model)?;
+        let fitted = self.take_sketch(chosen, model)?;
         let weak = &chosen.weak;
         let (left, usable) = match &fitted.fit {
             // Constants follow nothing.
@@ -108,7 +111,7 @@ impl Session<'_, '_, '_> {
                 let problem = fitted.model.problem(&weak.rows, &weak.rows.rhs, self.noise[0], None);
                 residuals(&problem, fit, &mut self.stages)?
             }
-            Some(_) if fitted.error < LESS => self.left_unseen(weak, &fitted, FEW_WINDOWS)?,
+            Some(_) if fitted.error < LESS => self.usual_unseen(weak, &fitted)?,
             _ => Default::default(),
         };
         chosen.fitted = Some(fitted);
@@ -142,7 +145,7 @@ impl Session<'_, '_, '_> {
         let gain = gain_of_torque(&chosen.weak);
         let raised = self.noise != self.channel_noise;
         for step in 0..STEPS {
-            let fitted = self.take_fitted(chosen, model)?;
+            let fitted = self.take_sketch(chosen, model)?;
             let left = self.left_over_expected(&chosen.weak, &fitted)?;
             let expected = fitted.expected.variance;
             let alone = fitted.model.windowed.is_empty();
@@ -171,7 +174,7 @@ impl Session<'_, '_, '_> {
     /// longer than the test function follow what is wrong as if it were motion: they must leave less. What a low-passed torque shows above the motion
     /// is noise, however much it is.
     fn is_no_noise(&mut self, chosen: &mut Chosen, model: &Model) -> Result<bool, Error> {
-        let fitted = self.take_fitted(chosen, model)?;
+        let fitted = self.take_sketch(chosen, model)?;
         let recorded = chosen.weak.rows.mean_square();
         let most = if fitted.has_windows_of_a_function(&chosen.weak) {
             left_by_short_windows(recorded, chosen.weak.largest_torque(chosen.parameters, self.noise[0]))
@@ -194,7 +197,7 @@ impl Session<'_, '_, '_> {
         if self.noise[1] == self.channel_noise[1] && !fitted.model.windowed.is_empty() && fitted.error <= MORE {
             return Ok(None);
         }
-        let (left, usable) = self.left_unseen(weak, fitted, FEW_WINDOWS)?;
+        let (left, usable) = self.usual_unseen(weak, fitted)?;
         Ok(usual_variance(&left, &usable).map(|variance| variance / fitted.expected.variance))
     }
 
@@ -204,30 +207,44 @@ impl Session<'_, '_, '_> {
         if fitted.model.windowed.is_empty() {
             return Ok(None);
         }
-        let (left, usable) = self.left_unseen(weak, fitted, MANY_WINDOWS)?;
+        let all = 0..weak.rows.len();
+        let (left, usable) = self.left_unseen(weak, fitted, (MANY_WINDOWS, &[all]))?;
         let shown = RowCovariance::of_residuals(&left, &usable, REACHES * weak.reach());
         Ok(Some(shown).filter(|shown| shown.variance() > 0.0))
     }
 
-    /// What a fit leaves of every row where it did not see that row, and whether it says anything of it. Parts of the record that hold so many
-    /// windows have constants of their own.
+    /// The same as [`Session::left_unseen`], of stretches of many rows where they hold as many windows.
+    fn usual_unseen(&mut self, weak: &WeakRows, fitted: &Decided) -> Result<(Vec<f64>, Vec<bool>), Error> {
+        let rows = weak.rows.len();
+        let span = fitted.fit.as_ref().and_then(|fit| fit.scale).map_or(rows, Scale::span);
+        let holds = |stretches: &Vec<Range<usize>>| stretches.iter().all(|one| one.len() >= MANY_WINDOWS * span);
+        let all = || std::iter::once(0..rows).collect();
+        let stretches = more_stretches_of_rows(rows).filter(holds).unwrap_or_else(all);
+        self.left_unseen(weak, fitted, (FEW_WINDOWS, &stretches))
+    }
+
+    /// What a fit leaves of every row of some stretches where it did not see that row, and whether it says anything of it. Parts of the record that hold so
+    /// many windows have constants of their own.
     fn left_unseen(
         &mut self,
         weak: &WeakRows,
         fitted: &Decided,
-        windows: usize,
+        (windows, stretches): (usize, &[Range<usize>]),
     ) -> Result<(Vec<f64>, Vec<bool>), Error> {
         let (mut left, mut usable) = (Vec::new(), Vec::new());
         let Some(fit) = fitted.fit.as_ref().filter(|_| fitted.white.is_none()) else { return Ok((left, usable)) };
         let problem = fitted.problem(&weak.rows, self.noise[0]);
         let span = fit.scale.map_or(weak.reach(), Scale::span);
-        let parts = (problem.rows() / (windows * span).max(1)).clamp(1, PARTS);
-        for part in 0..parts {
-            let rows = problem.rows() * part / parts..problem.rows() * (part + 1) / parts;
-            let jumps = problem.jumps_of(&rows);
-            let found = self.left_of_part(&problem.part(&rows, &jumps), fit.scale, fitted.expected)?;
-            left.extend(found.0);
-            usable.extend(found.1);
+        for stretch in stretches {
+            let (first, length) = (stretch.start, stretch.len());
+            let parts = (length / (windows * span).max(1)).clamp(1, PARTS / stretches.len());
+            for part in 0..parts {
+                let rows = first + length * part / parts..first + length * (part + 1) / parts;
+                let jumps = problem.jumps_of(&rows);
+                let found = self.left_of_part(&problem.part(&rows, &jumps), fit.scale, fitted.expected)?;
+                left.extend(found.0);
+                usable.extend(found.1);
+            }
         }
         Ok((left, usable))
     }

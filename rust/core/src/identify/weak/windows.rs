@@ -23,7 +23,7 @@ struct ComparedLengths {
 
 impl Session<'_, '_, '_> {
     /// Fits everything that is not windowed as constant, in windows of the length that predicts best. What the noise makes of rows depends on
-    /// the parameters, so a first fit gives those that the last one is made with.
+    /// the parameters, so a first fit gives those that the last one is made with. Of many rows that is a sketch, to be completed: windows in stretches of them.
     pub(crate) fn fit_constants(&mut self, weak: &WeakRows, decided: &mut Decided) -> Result<(), Error> {
         let (rows, stride) = (&weak.rows, weak.stride);
         let instructions = self.options.instructions;
@@ -82,13 +82,22 @@ impl Session<'_, '_, '_> {
         let best = if best.error < BADLY { better_known(&validated, best) } else { best };
         decided.error = if best.error.is_finite() { best.error } else { 1.0 };
         (decided.covariance, decided.expected) = self.covariance(weak, self.parameters(&model, &best.fit));
-        let scale = best.fit.scale;
-        decided.first = scale;
-        drop(validated);
-        let correlated = model.correlated(rows, &decided.covariance, &mut self.stages)?;
-        let problem = model.problem(rows, &rows.rhs, self.noise[0], Some(&correlated));
-        decided.correlated = Some(correlated);
-        decided.fit = Fit::new(&problem, scale, decided.expected, instructions, &mut self.stages)?;
+        decided.first = best.fit.scale;
+        let place = validated.iter().position(|one| std::ptr::eq(one, best));
+        let best = place.and_then(|place| validated.into_iter().nth(place)).map(|one| one.fit);
+        decided.correlated = Some(model.correlated(rows, &decided.covariance, &mut self.stages)?);
+        decided.fit = best.map(|fit| Fit { leave_gap_out: None, ..fit });
+        decided.is_sketch = true;
+        if stretches_of_rows(rows.len()).is_some() { Ok(()) } else { self.complete(weak, decided) }
+    }
+
+    /// Fits all rows where stretches of them told only which windows are best.
+    pub(crate) fn complete(&mut self, weak: &WeakRows, decided: &mut Decided) -> Result<(), Error> {
+        if std::mem::take(&mut decided.is_sketch) {
+            let problem = decided.problem(&weak.rows, self.noise[0]);
+            let (scale, expected, instructions) = (decided.first, decided.expected, self.options.instructions);
+            decided.fit = Fit::new(&problem, scale, expected, instructions, &mut self.stages)?;
+        }
         Ok(())
     }
 

@@ -25,7 +25,7 @@ impl Session<'_, '_, '_> {
         model: &Model,
         offset: usize,
     ) -> Result<bool, Error> {
-        let fitted = self.take_fitted(chosen, model)?;
+        let fitted = self.take_sketch(chosen, model)?;
         let is_raised = self.noise != self.channel_noise;
         let (error, is_odd) = (fitted.error, fitted.error > BADLY || fitted.has_shortest_windows() || is_raised);
         chosen.fitted = Some(fitted);
@@ -56,7 +56,7 @@ impl Session<'_, '_, '_> {
 
     /// The error of predicting rows with a model in which everything that is not windowed is constant.
     pub(crate) fn error_of(&mut self, chosen: &Chosen, model: &Model) -> Result<f64, Error> {
-        let fitted = self.fit_first(chosen, model)?;
+        let fitted = self.sketch_first(chosen, model)?;
         Ok(if fitted.fit.is_some() { fitted.error } else { f64::INFINITY })
     }
 

@@ -15,6 +15,7 @@ use crate::identify::weak::lag::Settled;
 use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::JudgedTerm;
 use crate::regression::model::Model;
+use crate::regression::subsample::{more_stretches_of_rows, thinned_rows};
 use crate::weak_form::test_function::TestFunction;
 
 /// Times that test function and windows are chosen again with the angle that was found.
@@ -127,10 +128,13 @@ impl Session<'_, '_, '_> {
         Ok(None)
     }
 
-    /// A better guess with which rows at hand are predicted better, if not by as much as a free offset does.
+    /// A better guess with which rows at hand, or stretches of many, are predicted better, if not by as much as a free offset does.
     fn improved(&mut self, guess: f64, chosen: &mut Chosen, model: &Model) -> Result<Option<f64>, Error> {
         let FreeOffset { error, free } = self.free_offset;
-        let (fitted, rows) = (chosen.fitted.take(), chosen.weak.rows.clone());
+        let fitted = chosen.fitted.take();
+        let some = more_stretches_of_rows(chosen.weak.rows.len());
+        let some = some.map_or_else(|| chosen.weak.rows.clone(), |some| thinned_rows(&chosen.weak.rows, &some));
+        let rows = std::mem::replace(&mut chosen.weak.rows, some);
         self.move_zero(chosen, guess);
         let rests = self.roughly(|session| session.approach(chosen, model))?;
         let with = chosen.fitted.as_ref().map_or(f64::INFINITY, |fitted| fitted.error);
