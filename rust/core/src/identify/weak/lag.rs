@@ -33,6 +33,8 @@ const STEPS: usize = 16;
 const SETTLED: f64 = 4e-3;
 /// A choice that moves the lag by no more, in standard errors, is the last.
 const CHOSEN: f64 = 0.1;
+/// The largest part of the last move that a move may be to tell where all of them lead.
+const MOST_OF_A_MOVE: f64 = 0.9;
 /// The least part of the lag that a step may be taken to cover, where noise of the rate hides the rest.
 const LEAST_RESPONSE: f64 = 0.05;
 /// A lag that is not known to this part of the test function's half-width is not determined: beyond it the rate is no line.
@@ -69,10 +71,41 @@ pub(crate) struct Followed {
 /// What was chosen and decided, and the lag that was found on the way.
 pub(crate) type Settled = (Chosen, Decided, Option<Lag>);
 
+/// Moves of a lag each of which is about the same part of the one before: what varies slowly took the rest over, and gives it back bit by bit.
+#[derive(Clone, Copy, Debug)]
+struct Creeping {
+    moved: f64,
+    part: f64,
+}
+
+impl Creeping {
+    /// Two moves, if the second is a part of the first.
+    fn new([before, moved]: [f64; 2]) -> Option<Self> {
+        let part = moved / before;
+        (part > 0.0 && part <= MOST_OF_A_MOVE).then_some(Self { moved, part })
+    }
+
+    /// What all further moves together will be: a geometric series.
+    fn left(self) -> f64 {
+        self.moved * self.part / (1.0 - self.part)
+    }
+
+    /// By how much the error of all of them is larger than that of one, which holds for what varies as it is.
+    fn raised(self) -> f64 {
+        1.0 / (1.0 - self.part)
+    }
+
+    /// Whether so many moves later one will be so small that it is the last.
+    fn settles_after(self, moves: usize, error: f64) -> bool {
+        let later = (0..moves).fold(self.moved, |moved, _| moved * self.part);
+        later.abs() <= CHOSEN * error
+    }
+}
+
 impl Session<'_, '_, '_> {
     /// Decides what is constant with the test function that was chosen, finds the lag where it is not given, and chooses again with it.
     pub(crate) fn decide_and_choose_again(&mut self, mut chosen: Chosen, model: &Model) -> Result<Settled, Error> {
-        let mut lag = None;
+        let (mut lag, mut without, mut last, mut raised) = (None, None, None, 1.0);
         if let Some(about) = self.large_lag(&chosen)? {
             self.record.lag = about;
             chosen = self.choose(model)?;
@@ -82,6 +115,10 @@ impl Session<'_, '_, '_> {
                 chosen = self.choose(model)?;
             }
             let mut decided = self.decide(&mut chosen, model)?;
+            // To be found again where no lag is: a search for what varies takes longest of all.
+            if self.options.lag.is_none() && choice == 1 && self.record.lag == 0.0 && !decided.slow.is_empty() {
+                without = Some((chosen.clone(), decided.clone(), (self.scan.clone(), self.suggested, self.noise)));
+            }
             (chosen, decided) = self.between_jumps_of_suggested(chosen, decided, model)?;
             if self.options.lag.is_some() || self.varies_too_much(&decided) {
                 return Ok((chosen, decided, None));
@@ -92,11 +129,12 @@ impl Session<'_, '_, '_> {
             let before = self.record.lag;
             lag = self.find_lag(&chosen, &decided)?;
             let Some(found) = lag else { break };
-            let settled = (found.value - before).abs() <= CHOSEN * found.error;
+            let moved = found.value - before;
+            let settled = moved.abs() <= CHOSEN * found.error;
             if settled || choice == CHOICES {
                 // The rows at hand stand: they differ from those of the last step by less than can be told. Where they have not settled, the last step is a
                 // part of the error.
-                let error = if settled { found.error } else { found.error.hypot(found.value - before) };
+                let error = raised * if settled { found.error } else { found.error.hypot(moved) };
                 // What changes slowly and the lag make room for each other: a lag that does not settle, and may be none, is not determined.
                 if !settled && !decided.slow.is_empty() && before.abs() <= CONSPICUOUS * error {
                     lag = None;
@@ -106,8 +144,26 @@ impl Session<'_, '_, '_> {
                 return Ok((chosen, decided, Some(Lag { value: before, error })));
             }
             self.record.lag = found.value;
+            let creeps = last.take().filter(|(_, slow)| *slow == decided.slow).and_then(|(before, _)| {
+                Creeping::new([before, moved]).filter(|one| !one.settles_after(1, found.error))
+            });
+            if let Some(creeps) = creeps {
+                let (limit, error) = (found.value + creeps.left(), creeps.raised() * found.error);
+                if limit.abs() <= CONSPICUOUS * error && !creeps.settles_after(CHOICES - choice, found.error) {
+                    // It will not settle, and may be none.
+                    lag = None;
+                    break;
+                }
+                (self.record.lag, raised) = (limit, creeps.raised());
+            } else if !decided.slow.is_empty() {
+                last = Some((moved, decided.slow));
+            }
         }
         self.record.lag = 0.0;
+        if let Some((chosen, decided, (scan, suggested, noise))) = without {
+            (self.scan, self.suggested, self.noise) = (scan, suggested, noise);
+            return Ok((chosen, decided, lag));
+        }
         let mut chosen = self.choose(model)?;
         let decided = self.decide(&mut chosen, model)?;
         Ok((chosen, decided, lag))
@@ -161,10 +217,13 @@ impl Session<'_, '_, '_> {
         (chosen, decided): (Chosen, Decided),
         model: &Model,
     ) -> Result<(Chosen, Decided), Error> {
-        let mut beside: Option<(Chosen, Decided)> = None;
+        if !self.of_kind(Kind::Varying).is_empty() {
+            return Ok((chosen, decided));
+        }
+        let mut beside: Option<Chosen> = None;
         let before = (self.scan.clone(), self.record.lag, self.noise);
         for _ in 0..TRIES {
-            let one = beside.as_ref().map_or(&chosen, |(one, _)| one);
+            let one = beside.as_ref().unwrap_or(&chosen);
             let constant = self.fit_first(one, model)?;
             let Some(found) = self.find_lag(one, &constant)? else { break };
             if beside.is_some() && (found.value - self.record.lag).abs() <= CHOSEN * found.error {
@@ -173,11 +232,23 @@ impl Session<'_, '_, '_> {
             }
             self.record.lag = found.value;
             let mut one = self.choose(model)?;
-            let again = self.decide(&mut one, model)?;
-            if again.fit.is_some() && again.slow.is_empty() && again.error < BADLY.max(decided.error) {
+            // What is told to vary is not followed: it will not stand.
+            let most = self.most_slow.replace(0);
+            let again = self.decide(&mut one, model);
+            self.most_slow = most;
+            let mut again = again?;
+            let stands = |again: &Decided| {
+                again.fit.is_some() && again.slow.is_empty() && again.error < BADLY.max(decided.error)
+            };
+            if stands(&again) && again.error >= BADLY {
+                // Nor was it asked whether something varies that is constant nowhere.
+                one = self.choose(model)?;
+                again = self.decide(&mut one, model)?;
+            }
+            if stands(&again) {
                 return Ok((one, again));
             }
-            beside = Some((one, again));
+            beside = Some(one);
         }
         (self.scan, self.record.lag, self.noise) = before;
         Ok((chosen, decided))
@@ -337,4 +408,21 @@ fn growing(rows: &mut Rows, regressors: &[usize]) -> Vec<usize> {
         }
     }
     (first..rows.regressors.len()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moves_that_shrink_by_one_factor_tell_where_they_lead() {
+        let one = Creeping::new([0.8, 0.4]).expect("a part");
+        // 0.2 + 0.1 + 0.05 and so on.
+        assert!((one.left() - 0.4).abs() < 1e-15 && (one.raised() - 2.0).abs() < 1e-15);
+        // The move after next is 0.1.
+        assert!(one.settles_after(2, 1.001) && !one.settles_after(2, 0.999) && !one.settles_after(1, 1.001));
+        for other in [[0.8, -0.4], [0.8, 0.8], [0.4, 0.8], [0.0, 0.1], [0.0, 0.0], [1.0, 0.0]] {
+            assert!(Creeping::new(other).is_none(), "{other:?}");
+        }
+    }
 }
