@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 import pytest
 
 import tvident
 from parameters import long
+from tvident._identify.task import Task
 
 Array = npt.NDArray[np.float64]
 
@@ -33,6 +36,21 @@ def errors(result: tvident.Identification, rig: tvident.TorsionalRecording) -> t
         for name in ("inertia", "stiffness")
     )
     return inertia, stiffness
+
+
+def test_what_may_be_missing_is_looked_for_once_the_torque_is_clipped(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = tvident.simulate_torsional_rig(2.0, seed=3)
+    looked: list[bool] = []
+    found = Task.found
+
+    def counted(self: Task, *given: Any, diagnose: bool = False, **named: Any) -> Any:
+        looked.append(diagnose)
+        return found(self, *given, diagnose=diagnose, **named)
+
+    monkeypatch.setattr(Task, "found", counted)
+    tvident.identify(rig.angle, spoilt(rig, 10, 5.0), sample_rate=rig.sample_rate, loss="huber")
+    assert len(looked) > 2
+    assert looked == [False] * (len(looked) - 1) + [True]
 
 
 @pytest.mark.slow

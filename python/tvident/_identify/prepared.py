@@ -34,6 +34,7 @@ from tvident._identify.signals import (
 from tvident._identify.task import Task
 from tvident._identify.together import sampled
 from tvident._identify.weighted import usable_channels, weights_of
+from tvident._results import Identification
 from tvident._units import (
     ROTARY,
     Axis,
@@ -171,8 +172,13 @@ def prepared(call: Mapping[str, Any]) -> Task | ExpandedTask:
     task = ExpandedTask if expansions_of(request) else Task
     if is_bridged and call["settings"] is None and request.lag == 0:
         data = with_read_torque(data, lambda some: task(some, request).run(None))
-    data = with_clipped_torque(data, asked, lambda some: task(some, request).run(None))
+    data = with_clipped_torque(data, asked, lambda some: _found(task(some, request)))
     return task(data, request)
+
+
+def _found(task: Task | ExpandedTask) -> Identification:
+    """Return what is identified, without looking for what may be missing where that can be left out."""
+    return task.run(None, diagnose=False) if isinstance(task, Task) else task.run(None)
 
 
 def _on_clocks(request: Request, clocks: OwnClocks | None, earlier: Mapping[str, Any] | None) -> Request:
