@@ -21,8 +21,8 @@ Array = npt.NDArray[np.float64]
 Acting: TypeAlias = tuple[str, Link]
 """A term, and what it acts between."""
 
-SOUGHT = ("coulomb", "cubic", "quadratic_drag")
-"""What is looked for: that which the core looks for where torques act."""
+SOUGHT = tuple(name for name, one in BUILT_IN.items() if one.is_sought and (one.dissipates or one.spring == "beside"))
+"""What is looked for: friction, and springs that harden, as the core does where torques act."""
 
 _WINDOWS = 4
 """Windows at hand, and lengths of a test function, in a block at least."""
