@@ -103,7 +103,7 @@ def fit_local_polynomials(
         the bits are the same.
     weights : array_like, shape (n,) or that of `y`, optional
         Weight of every sample, not negative: one over the variance of its noise, relative to the others. A sample of weight 0 is left out,
-        whatever it holds. ``sigma`` is then that of a sample of weight 1. Every window has polynomials of its own, as those beside gaps have.
+        whatever it holds. ``sigma`` is then that of a sample of weight 1. Every window is fitted on its own, as those beside gaps are.
     period : float, optional
         Period of a wrapped angle in the unit of `y`: 2π or 360. Whole periods are added first so that steps are the shortest that are
         possible. A sample after a step of 0.4 to 0.6 periods, which may go either way, counts as missing. ``settings["splits"]`` lists the
@@ -171,10 +171,10 @@ def fit_local_polynomials(
     It takes two to five times as long where few windows hold a gap, and up to 100 times where nearly all do, as with 1 % missing at random
     and windows of 800 samples for a slow motion: each takes some 10 µs then, of those at every `step`-th sample.
 
-    With ``nan_policy="omit"`` a window that lacks samples is fitted by polynomials that are orthogonal on the others, and each derivative takes
-    the order with the least estimated squared bias plus variance, since such a window is not symmetric. Its standard errors are those of
-    that order with the bias; that the order was chosen is not in them, so that nominal 95 % intervals cover 80 to 95 %. A
-    derivative above the order is zero and has no standard error (NaN). This costs some 2 µs a window of 201 samples and thread.
+    With ``nan_policy="omit"`` a window that lacks samples is fitted by polynomials that are orthogonal on the others, and each derivative
+    takes the order with the least estimated squared bias plus variance, since such a window is not symmetric. Its standard errors are those
+    of that order with the bias; that the order was chosen is not in them, so that nominal 95 % intervals cover 80 to 95 %. A derivative
+    above the order is zero and has no standard error (NaN). This costs some 2 µs a window of 201 samples and thread.
 
     Where `t` is not uniform every window has a design of its own, and derivatives are those at each sample's own time. A duration takes
     the samples that lie in it, however many; windows with fewer than 5 are NaN. ``"auto"`` chooses window and order of every derivative
