@@ -5,7 +5,7 @@ use crate::irregular::window_places::{Numbered, OwnWindow, PlacedWindow};
 use crate::local_polynomials::options::Order;
 use crate::local_polynomials::order_table::OrderTable;
 use crate::local_polynomials::own_orders::OwnOrders;
-use crate::local_polynomials::weighted_samples::{WeightedMemory, WeightedSamples, unit_of};
+use crate::local_polynomials::weighted_samples::{WeightedMemory, WeightedSamples};
 use crate::local_polynomials::weighted_windows::{DEPENDENT, HARDLY_THERE, OwnWindows};
 use crate::record::samples::all_usable;
 use crate::simd::instructions::Instructions;
@@ -29,7 +29,6 @@ struct WindowAlone<'a> {
     own: OwnWindow<'a>,
     table: &'a OrderTable,
     reference: f64,
-    unit: f64,
 }
 
 impl WindowFit {
@@ -78,7 +77,7 @@ impl WindowFit {
         };
         let mut memory = AloneMemory::default();
         self.fit_alone(record, &[window], Instructions::Scalar, true, &mut memory);
-        OwnOrders::new(&memory.own.found[0], &table, self.quantised()).criteria(self.order, window.unit)
+        OwnOrders::new(&memory.own.found[0], &table, self.quantised()).criteria(self.order)
     }
 
     /// A window that is to be fitted, or `None` where it holds an unusable sample or too few.
@@ -93,9 +92,8 @@ impl WindowFit {
         if length < self.least || table.degrees == 0 || !all_usable(samples) {
             return None;
         }
-        let unit = self.weights.as_ref().map_or(1.0, |weights| unit_of(weights[placed.samples.start + length / 2]));
         let own = self.span.own(&self.times, sample, placed);
-        Some(WindowAlone { place, sample, own, table, reference: samples[length / 2], unit })
+        Some(WindowAlone { place, sample, own, table, reference: samples[length / 2] })
     }
 
     /// Fits windows, one a lane.
@@ -122,7 +120,6 @@ impl WindowFit {
                 weights: self.weights.as_ref().map_or(&alike[..range.len()], |weights| &weights[range.clone()]),
                 values: &record[range],
                 reference: window.reference,
-                unit: window.unit,
                 at: (self.times[window.sample] - window.own.middle) / window.own.half,
                 most: window.table.degrees,
             };
@@ -159,6 +156,6 @@ impl WindowFit {
         }
         fits.order[place] = u8::try_from(order).unwrap_or(u8::MAX);
         fits.status[place] = self.status(order, orders.orders(), edge, orders.is_exact(order)).bits();
-        fits.sigma[place] = (variance / window.unit).sqrt();
+        fits.sigma[place] = (variance / orders.unit()).sqrt();
     }
 }

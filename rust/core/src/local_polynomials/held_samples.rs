@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::local_polynomials::incomplete_record::Incomplete;
-use crate::local_polynomials::weighted_samples::{WeightedSamples, unit_of};
+use crate::local_polynomials::weighted_samples::WeightedSamples;
 use crate::status::Status;
 
 /// A window that is to be fitted.
@@ -20,8 +20,6 @@ pub(crate) struct HeldWindow {
     pub(crate) count: usize,
     /// What is taken off all of them: the one in their middle.
     pub(crate) reference: f64,
-    /// What weights are multiplied by: a power of two, so that no digit changes.
-    pub(crate) unit: f64,
     pub(crate) flags: Status,
 }
 
@@ -104,7 +102,6 @@ impl HeldSamples {
             laid,
             count,
             reference: self.values[middle],
-            unit: unit_of(self.weights[middle]),
             flags,
         })
     }
@@ -117,9 +114,45 @@ impl HeldSamples {
             weights: &self.weights[laid.clone()],
             values: &self.values[laid],
             reference: window.reference,
-            unit: window.unit,
             at: times[window.at],
             most: window.count,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_share_what_lies_in_both() {
+        let samples: Vec<f64> =
+            (0..60).map(|sample| if sample % 10 == 3 { f64::NAN } else { f64::from(sample) }).collect();
+        let weights: Vec<f64> =
+            (0..60).map(|sample| if sample == 21 { 0.0 } else { f64::from(sample) + 1.0 }).collect();
+        let record = Incomplete { samples: &samples, weights: Some(&weights), parts: &[0..48, 50..60], least: 5 };
+        let times: Vec<f64> = (-3..=3).map(|time| f64::from(time) / 3.0).collect();
+        let mut held = HeldSamples::default();
+        // Twice, and one after the other or far from each other.
+        for places in [&[18, 19, 45, 46][..], &[0, 1, 59, 30, 30]] {
+            held.clear();
+            let windows: Vec<HeldWindow> = (places.iter().enumerate())
+                .map(|(number, &place)| held.window(&record, (number, place), (7, 3)).expect("it holds enough"))
+                .collect();
+            assert!(held.values.len() < 7 * places.len());
+            for (window, &place) in windows.iter().zip(places) {
+                let own = held.own(window, &times);
+                let first = place - window.at;
+                let expected: Vec<f64> = window.inside.clone().map(|at| record.weight(first + at)).collect();
+                assert_eq!((own.weights, own.most), (&expected[..], expected.iter().filter(|one| **one > 0.0).count()));
+                for (at, (value, weight)) in window.inside.clone().zip(own.values.iter().zip(own.weights)) {
+                    assert!(*weight == 0.0 || value.to_bits() == samples[first + at].to_bits());
+                }
+                assert!(own.values.contains(&own.reference) && (own.at - times[window.at]).abs() < 1e-15);
+                assert_eq!(window.flags.bits() & Status::EDGE.bits() > 0, window.at != 3);
+            }
+        }
+        let lost = held.window(&record, (0, 49), (7, 3)).err();
+        assert_eq!(lost, Some(Status::GAP));
     }
 }

@@ -181,6 +181,6 @@ impl LocalPolynomials {
             (sums.values[taken] * scale + level, error * scale)
         };
         let derivatives = options.derivatives.iter().map(one).collect();
-        IncompleteEstimate { derivatives, order, status: flags, sigma: (variance / window.unit).sqrt() }
+        IncompleteEstimate { derivatives, order, status: flags, sigma: (variance / own.unit).sqrt() }
     }
 }

@@ -39,6 +39,11 @@ impl<'a> OwnOrders<'a> {
         self.own.columns.min(self.table.degrees)
     }
 
+    /// What weights were multiplied by.
+    pub(crate) fn unit(&self) -> f64 {
+        self.own.unit
+    }
+
     /// What of each order is left, at least the floor.
     fn residual(&self, order: usize) -> f64 {
         self.residuals[order].max(self.floor)
@@ -60,10 +65,10 @@ impl<'a> OwnOrders<'a> {
         }
     }
 
-    /// The criterion of every candidate, of weights that were multiplied by `unit`; NaN for those that the samples do not determine.
-    pub(crate) fn criteria(&self, order: Order, unit: f64) -> Vec<f64> {
+    /// The criterion of every candidate; NaN for those that the samples do not determine.
+    pub(crate) fn criteria(&self, order: Order) -> Vec<f64> {
         let Order::Chosen { criterion, .. } = order else { return vec![f64::NAN] };
-        let of = |order| criterion.score(self.residual(order) / unit, order, self.table.length);
+        let of = |order| criterion.score(self.residual(order) / self.own.unit, order, self.table.length);
         (0..self.table.degrees).map(|order| if order < self.orders() { of(order) } else { f64::NAN }).collect()
     }
 

@@ -19,8 +19,6 @@ pub(crate) struct WeightedSamples<'a> {
     pub(crate) values: &'a [f64],
     /// What is taken off all samples.
     pub(crate) reference: f64,
-    /// What weights are multiplied by, so that they are neither very large nor very small.
-    pub(crate) unit: f64,
     /// Time that derivatives are wanted at.
     pub(crate) at: f64,
     /// Polynomials at most: no more than samples that are there.
@@ -34,6 +32,8 @@ pub(crate) struct OwnPolynomials {
     pub(crate) columns: usize,
     /// Coefficients of the samples in polynomials of length 1.
     pub(crate) projections: [f64; MOST],
+    /// What weights were multiplied by, so that the greatest is about one: a power of two, which changes no digit.
+    pub(crate) unit: f64,
     /// Sum of the weights.
     pub(crate) weight: f64,
     /// Weighted sum of squares of the samples, and of what the last polynomial leaves.
@@ -59,9 +59,9 @@ pub(crate) struct WeightedMemory {
     pub(crate) found: [OwnPolynomials; MOST_LANES],
 }
 
-/// What the weights of a window are multiplied by, given one of them: a power of two, so that no digit changes.
-pub(crate) fn unit_of(weight: f64) -> f64 {
-    (-weight.log2().round().clamp(-1000.0, 1000.0)).exp2()
+/// The power of two that the weights of a window are multiplied by, given the greatest of them.
+pub(crate) fn unit_of(greatest: f64) -> f64 {
+    if greatest > 0.0 { (-greatest.log2().round().clamp(-1000.0, 1000.0)).exp2() } else { 1.0 }
 }
 
 impl WeightedMemory {

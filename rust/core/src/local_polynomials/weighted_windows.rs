@@ -78,13 +78,13 @@ impl OwnWindows<'_> {
         let (lanes, rows) = (S::F64_LANES, self.derivatives + 1);
         let time = numbers_of(simd, self.windows, |window| window.at);
         found.at(simd, degrees, rows, time, self.memory, self.twice);
-        let [columns, weight, energy, left, worst] =
-            [found.columns, found.squares[0], found.energy, found.left, found.orthogonal.worst]
+        let [columns, unit, weight, energy, left, worst] =
+            [found.columns, found.unit, found.squares[0], found.energy, found.left, found.orthogonal.worst]
                 .map(|vector| numbers(simd, vector));
         let WeightedMemory { derivatives, found: all, .. } = self.memory;
         for (lane, one) in all[..self.windows.len()].iter_mut().enumerate() {
             one.columns = (0..degrees).take_while(|&column| (column as f64) < columns[lane]).count();
-            (one.weight, one.energy, one.left) = (weight[lane], energy[lane], left[lane]);
+            (one.unit, one.weight, one.energy, one.left) = (unit[lane], weight[lane], energy[lane], left[lane]);
             one.orthogonal = worst[lane] <= ORTHOGONAL;
             one.derivatives.resize(rows, [0.0; MOST]);
         }
@@ -148,7 +148,6 @@ mod tests {
                 weights,
                 values,
                 reference: 0.5,
-                unit: 0.25,
                 at: 0.3,
                 most: weights.iter().filter(|weight| **weight > 0.0).count(),
             })
@@ -228,7 +227,7 @@ mod tests {
                 let mut memory = WeightedMemory::default();
                 for (times, weights) in &cases[..3] {
                     let (values, most) = (&values[..], degrees);
-                    let window = WeightedSamples { times, weights, values, reference: 0.0, unit: 1.0, at: 0.0, most };
+                    let window = WeightedSamples { times, weights, values, reference: 0.0, at: 0.0, most };
                     let windows = &[window][..];
                     let kernel = OwnWindows {
                         memory: &mut memory,
@@ -240,7 +239,8 @@ mod tests {
                     };
                     dispatch(instructions, kernel);
                     let one = &memory.found[0];
-                    let (parts, left) = by_qr(times, weights, values, degrees);
+                    let weights: Vec<f64> = weights.iter().map(|weight| weight * one.unit).collect();
+                    let (parts, left) = by_qr(times, &weights, values, degrees);
                     // Rounding of the samples, of which there are so many, beside what orthogonality may lack.
                     let tolerance = if one.orthogonal { 1e-11 * one.energy.sqrt() } else { 1e-6 * one.energy.sqrt() };
                     for (part, own) in parts.iter().zip(&one.projections) {

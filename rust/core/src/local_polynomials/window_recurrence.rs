@@ -1,8 +1,8 @@
 //! The recurrence that polynomials follow which are orthogonal on the samples of a window, for windows side by side, one a lane.
 
-use crate::local_polynomials::weighted_samples::{MOST, WeightedMemory, WeightedSamples, numbers_of};
+use crate::local_polynomials::weighted_samples::{MOST, WeightedMemory, WeightedSamples, numbers_of, unit_of};
 use crate::simd::aligned::{Aligned, OnLines};
-use crate::simd::vectors::Lanes;
+use crate::simd::vectors::{Lanes, MOST_LANES};
 
 /// What is known of windows side by side.
 pub(crate) struct Recurrence<S: Lanes> {
@@ -13,6 +13,8 @@ pub(crate) struct Recurrence<S: Lanes> {
     pub(crate) middles: OnLines<S::f64s, MOST>,
     pub(crate) ratios: OnLines<S::f64s, MOST>,
     pub(crate) coefficients: OnLines<S::f64s, MOST>,
+    /// What weights are multiplied by.
+    pub(crate) unit: S::f64s,
     pub(crate) energy: S::f64s,
     pub(crate) left: S::f64s,
     /// Polynomials that are told apart.
@@ -44,7 +46,13 @@ impl<S: Lanes> Recurrence<S> {
         let mut sums = PolynomialSums::<S> { square: zero, moment: zero, product: zero };
         let mut energy = zero;
         let reference = numbers_of(simd, windows, |window| window.reference);
-        let unit = numbers_of(simd, windows, |window| window.unit);
+        let mut greatest = zero;
+        for weight in memory.weights.chunks_exact(lanes) {
+            greatest = simd.max_f64s(greatest, simd.load(weight, 0));
+        }
+        let mut unit = [0.0; MOST_LANES];
+        simd.store(&mut unit, 0, greatest);
+        let unit = simd.load(&unit.map(unit_of), 0);
         let samples = memory.times.chunks_exact(lanes).zip(memory.weights.chunks_exact_mut(lanes));
         let columns = memory.columns[0].chunks_exact_mut(lanes);
         for (((time, weights), values), column) in samples.zip(memory.left.chunks_exact_mut(lanes)).zip(columns) {
@@ -67,6 +75,7 @@ impl<S: Lanes> Recurrence<S> {
             middles: nothing.clone(),
             ratios: nothing.clone(),
             coefficients: nothing.clone(),
+            unit,
             energy,
             left: zero,
             columns: simd.select_f64s(is_there, one, zero),
