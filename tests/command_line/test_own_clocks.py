@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from nptdms import ChannelObject, TdmsWriter
@@ -60,3 +61,35 @@ def test_a_clock_is_that_of_the_group_of_the_angle(tmp_path: Path) -> None:
     np.savez(tmp_path / "rig.npz", **named)  # type: ignore[arg-type]
     command = ("identify", tmp_path / "rig.npz", "--angle", "angle.data", "--torque", "torque.data", "--time", "time")
     assert "known to" in run(*command).stdout
+
+
+COMMAND = ("--angle", "a.angle", "--torque", "b.torque", "--method", "weak", "--step", "100")
+
+
+@pytest.mark.parametrize("late", [0.04, 1e-3, 2e-6, 1e-12])
+def test_groups_of_a_file_have_clocks(tmp_path: Path, late: float) -> None:
+    """Two groups of HDF5 whose times differ by 40 ms were one clock; stamps that differ by rounding are."""
+    made = tvident.simulate_torsional_rig(duration=3.0)
+    with h5py.File(tmp_path / "rig.h5", "w") as file:
+        for name, values in {"a/time": made.time, "a/angle": made.angle, "b/time": made.time + late}.items():
+            file[name] = values
+        file["b/torque"] = made.torque
+    done = run("identify", tmp_path / "rig.h5", *COMMAND, "--time", "a.time")
+    if late < 1e-5:
+        assert "known to" in done.stdout
+    else:
+        assert done.returncode == 2
+        assert "rig.h5 has a.time and b.time, and got --time a.time for both" in done.stderr
+
+
+def test_a_recorded_channel_called_time_is_no_clock(tmp_path: Path) -> None:
+    """Between angle and torque it was the torque's."""
+    made = tvident.simulate_torsional_rig(duration=3.0)
+    period = {"wf_increment": 1e-3}
+    channels = {"angle": (made.angle, "rad"), "time": (made.time + 100, "s"), "torque": (made.torque, "N m")}
+    with TdmsWriter(str(tmp_path / "rig.tdms")) as writer:
+        writer.write_segment(
+            [ChannelObject("rig", name, one, {**period, "unit_string": unit}) for name, (one, unit) in channels.items()]
+        )
+    command = ("identify", tmp_path / "rig.tdms", "--angle", "angle", "--torque", "torque", "--method", "weak")
+    assert "known to" in run(*command, "--step", "100", "--time", "time").stdout

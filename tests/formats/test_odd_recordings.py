@@ -83,6 +83,14 @@ def test_parts_of_other_units_or_rates_are_no_channel(tmp_path: Path, of_second:
     assert why in skipped
 
 
+def test_parts_whose_properties_differ_by_rounding_or_spelling_are_one_channel(tmp_path: Path) -> None:
+    """Such channels were lost."""
+    kinds = [{"wf_increment": (1 + 1e-13) / 250, "unit_string": "rad"}, {"unit_string": "radians"}]
+    parts: Any = [[("angle", ANGLE, one)] for one in kinds]
+    found, skipped, _ = read(tdms(tmp_path / "x.tdms", *parts))
+    assert (found["angle"].shape, skipped) == ((2 * ANGLE.size,), "")
+
+
 def test_properties_that_are_written_before_or_behind_samples_are_of_all(tmp_path: Path) -> None:
     parts: Any = [[("angle", samples, {"unit_string": unit})] for samples, unit in ((T[:0], "rad"), (T[:0], "deg"))]
     found, skipped, _ = read(tdms(tmp_path / "x.tdms", parts[0], [("angle", ANGLE, {})], parts[1]))
@@ -337,6 +345,15 @@ def test_columns_of_a_matrix_are_called_as_attributes_say(
     }
     np.testing.assert_array_equal(found["angle"], ANGLE)
     assert not skipped
+
+
+@pytest.mark.parametrize("key", ["title", "name"])
+def test_a_title_calls_no_columns(tmp_path: Path, key: str) -> None:
+    """`knee, slow` named two columns."""
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        file["data"] = MATRIX[:, 1:]
+        file.attrs[key] = "knee, slow"
+    assert list(read(tmp_path / "x.h5")[0]) == ["data"]
 
 
 def test_a_list_beside_a_matrix_calls_its_columns(tmp_path: Path) -> None:

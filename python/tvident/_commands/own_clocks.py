@@ -20,6 +20,9 @@ _GROUPED = frozenset((".tdms", ".mf4", ".mdf", ".uff", ".unv", ".c3d", ".xdf", "
 
 _TIME = re.compile(r"time(_[0-9]+)?")
 
+_CLOSE = 1e-2
+"""Part of a step that two clocks may differ by and still be one: rounding, and stamps of one driver."""
+
 
 def check_own_clocks(
     channels: recordings.Channels,
@@ -32,10 +35,11 @@ def check_own_clocks(
     takes_both: bool = True,
 ) -> None:
     """Refuse the clock of one channel for another that has a clock of its own, and say how to give both; warn beside a sample rate."""
-    if torque_time is not None or file is None or ending_of(Path(file)).lower() not in _GROUPED:
+    if torque_time is not None or file is None:
         return
+    of = _clock_before if ending_of(Path(file)).lower() in _GROUPED else _clock_beside
     try:
-        clocks = [_clock_of(channels, full_name(channels, name, file)) for name in names]
+        clocks = [of(channels, full_name(channels, name, file)) for name in names]
     except KeyError:
         return  # of another file
     if None in clocks or len(clocks) < 2 or _are_one(channels, clocks):  # noqa: PLR2004 - a motion and a torque
@@ -57,13 +61,21 @@ def check_own_clocks(
     click.echo(f"Warning: {where}; a sample rate takes their first samples as of one time; give {cure}", err=True)
 
 
-def _clock_of(channels: recordings.Channels, name: str) -> str | None:
+def _clock_beside(channels: recordings.Channels, name: str) -> str | None:
+    """Return the times in a channel's group of the file, where it is in one."""
+    prefix = named_unit(name)[0].rpartition(".")[0]
+    beside = (one for one in channels if prefix and named_unit(one)[0] == f"{prefix}.time")
+    return next((one for one in beside if channels[one].shape == channels[name].shape), None)
+
+
+def _clock_before(channels: recordings.Channels, name: str) -> str | None:
     """Return the times that a channel was sampled at, by their name in the file; None where it has none."""
     clock = None
     group = named_unit(name)[0]
     for one, values in channels.items():
         prefix, _, bare = named_unit(one)[0].rpartition(".")
-        if _TIME.fullmatch(bare) and group.startswith(prefix):
+        # Channels of one clock have no groups before their names: more times are a channel that was recorded.
+        if _TIME.fullmatch(bare) and group.startswith(prefix) and (prefix or clock is None):
             clock = one
         if one == name:
             return clock if clock != one and clock is not None and channels[clock].shape == values.shape else None
@@ -72,4 +84,10 @@ def _clock_of(channels: recordings.Channels, name: str) -> str | None:
 
 def _are_one(channels: recordings.Channels, clocks: Sequence[Any]) -> bool:
     first, last = (channels[one] for one in (clocks[0], clocks[-1]))
-    return clocks[0] == clocks[-1] or np.array_equal(first, last)
+    if clocks[0] == clocks[-1] or np.array_equal(first, last):
+        return True
+    if first.shape != last.shape or first.size < 2:  # noqa: PLR2004 - a step
+        return False
+    times = [np.asarray(one, float) for one in (first, last)]
+    step = abs(times[0][-1] - times[0][0]) / (first.size - 1)
+    return bool(np.nanmax(np.abs(times[1] - times[0])) <= _CLOSE * step)

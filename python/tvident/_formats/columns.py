@@ -14,6 +14,9 @@ COLUMNS = re.compile(
 )
 """What a list of the columns of a matrix beside it is called, as ``importdata`` has it in ``colheaders``."""
 
+_WORD = re.compile(r"name|label|header|title")
+"""What is about the whole where it is a text: a list of these has the name of each column."""
+
 _BETWEEN = re.compile(r"[,;|\t\n]")
 
 
@@ -55,7 +58,10 @@ def _list_in(attributes: Mapping[str, Any], shape: Sequence[int]) -> list[str]:
     """Return the names of as many columns, or rows, as a matrix has; nothing where the attributes say none."""
     for key in attributes:
         if COLUMNS.fullmatch(str(key).lower()):
-            found = _words(first_of(attributes, [key]))
+            value = first_of(attributes, [key])
+            if isinstance(value, str) and _WORD.fullmatch(str(key).lower()):
+                continue
+            found = _words(value)
             if len(found) in shape and 1 < len(found) < max(shape) and all(found):
                 return found
     return []

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from numbers import Real
 from typing import Any
 
 from tvident._formats.groups import TIME, Group, axis_of, named
 from tvident._formats.tdms_parts import Parts, parts_noted, parts_of
 from tvident._formats.told import Logged, Remark, cut, in_words
-from tvident._units import factor_between
+from tvident._units import UnitError, factor_between
 
 _UNITS = ("unit_string", "ni_unitdescription", "unit", "units", "y_unit_label", "unit_description")
 """Properties that hold a unit, in small letters."""
@@ -19,6 +21,9 @@ _UNSET = "1904-01-02"
 
 _SAME_START = 1e-3
 """Parts of a sample period that two starts may differ by and still be one."""
+
+_ROUNDED = 1e-7
+"""Part of a number, a sample period or a factor, that rounding may make of it."""
 
 _GOES_ON = 0.5
 """Parts of a sample period that what was appended may begin beside the next sample and still go on."""
@@ -97,11 +102,25 @@ def _changed(parts: Parts) -> str:
     for what, of in kinds:
         # What was written later may have been known later.
         said = [value for value in (of(properties) for _, properties in parts) if value]
-        other = next((value for value in said if str(value) != str(said[0])), None)
+        other = next((value for value in said if not _alike(value, said[0])), None)
         if other is not None:
             shown = f": {said[0]}, then {other}" if isinstance(other, str | float) else ""
             return f"it was appended to with another {what}{shown}"
     return ""
+
+
+def _alike(value: Any, other: Any) -> bool:
+    """Return whether two parts mean the same by a property: numbers but for rounding, units by what they are."""
+    if isinstance(value, Mapping) and isinstance(other, Mapping):
+        return value.keys() == other.keys() and all(_alike(one, other[name]) for name, one in value.items())
+    if str(value) == str(other):
+        return True
+    if isinstance(value, Real) and isinstance(other, Real):
+        return math.isclose(value, other, rel_tol=_ROUNDED)
+    try:
+        return factor_between(str(value), str(other), name="unit") == 1
+    except UnitError:
+        return False
 
 
 def _starts(parts: Parts) -> list[tuple[int, Any]]:
