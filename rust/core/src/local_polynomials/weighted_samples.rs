@@ -8,7 +8,7 @@ use crate::simd::vectors::{Lanes, MOST_LANES};
 pub(crate) const MOST: usize = HIGHEST_ORDER + 1;
 
 /// Windows of more samples are made orthogonal twice one by one: all polynomials of some side by side take much memory.
-pub(crate) const LONG: usize = 4096;
+pub(crate) const LONG: usize = 1 << 15;
 
 /// One window's samples. Those that are missing have the weight 0 and any value.
 #[derive(Clone, Copy, Debug, Default)]
