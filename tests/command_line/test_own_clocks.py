@@ -93,3 +93,19 @@ def test_a_recorded_channel_called_time_is_no_clock(tmp_path: Path) -> None:
         )
     command = ("identify", tmp_path / "rig.tdms", "--angle", "angle", "--torque", "torque", "--method", "weak")
     assert "known to" in run(*command, "--step", "100", "--time", "time").stdout
+
+
+@pytest.mark.parametrize("option", ["--instrument", "--mask", "--weights", "--velocity"])
+def test_what_lies_beside_the_motion_has_its_clock(tmp_path: Path, option: str) -> None:
+    """A mask or an instrument that began 40 ms later was taken in without a word."""
+    made = tvident.simulate_torsional_rig(duration=3.0)
+    named = {"a.time": made.time, "a.angle": made.angle, "a.torque": made.torque, "a.ok": np.ones_like(made.time)}
+    named |= {"b.time": made.time + 0.04, "b.ok": np.ones_like(made.time)}
+    np.savez(tmp_path / "rig.npz", **named)  # type: ignore[arg-type]
+    command = ("identify", tmp_path / "rig.npz", "--angle", "a.angle", "--torque", "a.torque", "--time", "a.time")
+    refused = run(*command, option, "b.ok")
+    assert refused.returncode == 2
+    assert f"{option} must have a sample for each of the motion" in refused.stderr
+    assert "rig.npz has a.time for that and b.time for b.ok" in refused.stderr
+    if option in ("--mask", "--weights"):
+        assert "known to" in run(*command, option, "a.ok", "--method", "weak", "--step", "100").stdout

@@ -170,7 +170,8 @@ def test_a_torque_that_is_turned_on_and_off_is_no_mark(level: float) -> None:
     assert marks_that_stay([Numbers("torque", torque)], 1e-3) == []
     both = np.select([number // 250 % 4 == 0, number // 250 % 4 == 2], [level, -level], noise[0])
     assert marks_that_stay([Numbers("torque", both)], 1e-3) == []
-    for missing in (np.where(is_on, -level, noise[0]), np.where(number // 500 == 3, level, noise[0])):
+    one_by_one = [np.where(is_on, -level, noise[0]), np.where(number // 500 == 3, level, noise[0])]
+    for missing in (*one_by_one, np.where(is_on, 1e20, noise[0])):
         assert len(marks_that_stay([Numbers("torque", missing)], 1e-3)) == 1
 
 

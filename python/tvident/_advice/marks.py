@@ -14,6 +14,9 @@ from tvident._results import MARKED
 _TURNS, _PART = 4, 0.1
 """Times that a torque stands at a number above zero, and the part of all samples, from which on a drive is turned on and off."""
 
+_NO_TORQUE = 1e10
+"""No drive has so much torque, in any unit."""
+
 _MOMENT, _SELDOM = 50, 0.02
 """Samples, and the part of all: what stands for less, and is not more often, is a reading that failed, which is seen and left out."""
 
@@ -82,7 +85,8 @@ def _questions(one: Numbers, recorded: npt.NDArray[np.number], period: float) ->
         for mark, places in _found(one, recorded)
         if not (one.is_measured and _is_seen(places, recorded.size))
     ]
-    is_driven = any(mark > 0 for mark, _ in found) and all(_is_turned_on(places, recorded.size) for _, places in found)
+    is_driven = any(0 < mark < _NO_TORQUE for mark, _ in found)
+    is_driven = is_driven and all(_is_turned_on(places, recorded.size) for _, places in found)
     if one.name.startswith("torque") and is_driven:
         return []
     return [_question(one.name, mark, places, period) for mark, places in found]

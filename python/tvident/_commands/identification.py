@@ -16,7 +16,7 @@ from tvident._commands.equation import lag_of, parameter_of, terms_of
 from tvident._commands.given import check_time, given, period_of, wanted_progress
 from tvident._commands.method import NAMES, method_of
 from tvident._commands.output import RECORDING
-from tvident._commands.own_clocks import check_own_clocks
+from tvident._commands.own_clocks import check_beside, check_own_clocks
 from tvident._commands.rates import say_other_rate
 from tvident._commands.scales import scaled
 from tvident._commands.settings import read_settings
@@ -76,6 +76,9 @@ def identified(
     named = {name: channel for name, channel in motion.items() if channel is not None}
     has_rate = is_given and time_channel is None
     check_own_clocks(channels, [*named.values(), torque], time_channel, torque_time, file, has_rate=has_rate)
+    beside: dict[str, str | None] = {f"--{name}": one for name, one in list(named.items())[1:]}
+    beside |= {"--instrument": instrument, "--mask": mask, "--weights": weights}
+    check_beside(channels, next(iter(named.values()), torque), beside, file)
     check_has_times("an identification needs", is_given, channels, file)
     recorded = [source_of(channels, name, file) for name in (*named.values(), torque)]
     times = times_of(channels, time_channel, next(iter(named.values())), file)

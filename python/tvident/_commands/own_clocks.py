@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +37,7 @@ def check_own_clocks(
     """Refuse the clock of one channel for another that has a clock of its own, and say how to give both; warn beside a sample rate."""
     if torque_time is not None or file is None:
         return
-    of = _clock_before if ending_of(Path(file)).lower() in _GROUPED else _clock_beside
+    of = _clock_in(file)
     try:
         clocks = [of(channels, full_name(channels, name, file)) for name in names]
     except KeyError:
@@ -59,6 +59,32 @@ def check_own_clocks(
         )
     where = f"{printable(file)}: angle and torque have clocks of their own, {first} and {last}"
     click.echo(f"Warning: {where}; a sample rate takes their first samples as of one time; give {cure}", err=True)
+
+
+def check_beside(
+    channels: recordings.Channels, motion: str, others: Mapping[str, str | None], file: str | None
+) -> None:
+    """Refuse channels, by what messages call them, whose samples were taken at other times than those of the motion."""
+    if file is None:
+        return
+    of = _clock_in(file)
+    try:
+        own = of(channels, full_name(channels, motion, file))
+        clocks = {what: of(channels, full_name(channels, one, file)) for what, one in others.items() if one is not None}
+    except KeyError:
+        return  # of another file
+    for what, clock in clocks.items():
+        if own is not None and clock is not None and not _are_one(channels, [own, clock]):
+            first, other = (printable(named_unit(one)[0]) for one in (own, clock))
+            raise click.UsageError(
+                f"{what} must have a sample for each of the motion; {printable(file)} has {first} for that and {other} for "
+                f"{printable(others[what] or '')}; resample one channel at the times of the other"
+            )
+
+
+def _clock_in(file: str) -> Callable[[recordings.Channels, str], str | None]:
+    """Return what finds the times of a channel in a file of this kind."""
+    return _clock_before if ending_of(Path(file)).lower() in _GROUPED else _clock_beside
 
 
 def _clock_beside(channels: recordings.Channels, name: str) -> str | None:
