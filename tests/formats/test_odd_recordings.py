@@ -347,6 +347,24 @@ def test_columns_of_a_matrix_are_called_as_attributes_say(
     assert not skipped
 
 
+def test_chunks_that_were_never_written_are_said(tmp_path: Path) -> None:
+    """They were zeros without a word."""
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        made = file.create_dataset("torque", TORQUE.shape, "f8", chunks=(50,), fillvalue=0.0)
+        made[:100] = TORQUE[:100]
+        file.create_dataset("angle", data=ANGLE, chunks=(50,))
+    count = -(-TORQUE.size // 50)
+    said = f"torque: {count - 2} of {count} chunks were never written and were read as 0.0"
+    assert read(tmp_path / "x.h5")[2] == said
+
+
+def test_a_list_of_matrices_calls_none_of_their_rows(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        file["angle"], file["torque"] = np.stack([ANGLE, ANGLE]), np.stack([TORQUE, TORQUE])
+        file.attrs["channels"] = "angle,torque"
+    assert list(read(tmp_path / "x.h5")[0]) == ["angle", "torque"]
+
+
 @pytest.mark.parametrize("key", ["title", "name"])
 def test_a_title_calls_no_columns(tmp_path: Path, key: str) -> None:
     """`knee, slow` named two columns."""

@@ -27,7 +27,9 @@ def channels_of(name: str, array: Any, attributes: Sequence[Mapping[str, Any]]) 
         yield _named(name, unit), array
         return
     matrix = array.reshape([length for length in array.shape if length > 1])
-    names = next((one for each in attributes if (one := _list_in(each, matrix.shape))), [])
+    # A list that has the name of the matrix itself is one of what lies beside it.
+    own = name.rpartition(".")[2]
+    names = next((one for each in attributes if (one := _list_in(each, matrix.shape)) and own not in one), [])
     count = len(names) or min(matrix.shape)
     units = _words(unit)
     if not names and not isinstance(unit, str) and len(units) != count:
@@ -36,8 +38,8 @@ def channels_of(name: str, array: Any, attributes: Sequence[Mapping[str, Any]]) 
     columns = matrix.T if matrix.shape[-1] == count else matrix
     of_columns = units if len(units) == count else [unit if isinstance(unit, str) else ""] * count
     for place, samples in enumerate(columns):
-        own = names[place] if names else str(place)
-        yield _named(f"{name}.{own}" if name else own, of_columns[place]), samples
+        column = names[place] if names else str(place)
+        yield _named(f"{name}.{column}" if name else column, of_columns[place]), samples
 
 
 def first_of(attributes: Mapping[str, Any], names: Sequence[str]) -> Any:

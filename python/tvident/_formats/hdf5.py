@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from typing import Any
 
 from tvident._formats.columns import COLUMNS, UNITS, channels_of, first_of
-from tvident._formats.told import cut, in_words
+from tvident._formats.told import Remark, cut, in_words
 
 RATES = ("sample_rate", "sampling_rate", "fs", "Fs", "samplerate", "SampleRate")
 """Attributes that hold a sample rate."""
@@ -36,9 +37,20 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
             except Exception as error:  # noqa: BLE001 - of one dataset; the others may be whole
                 skipped.append(f"{cut(bare)} ({in_words(error)})")
                 continue
+            skipped += _never_written(cut(bare), dataset)
             # A list of the columns may stand beside a matrix, as a dataset of its own.
             beside = {one.rpartition("/")[2]: words for one, words in lists.items() if _is_beside(one, name)}
             yield from channels_of(bare, values, [dataset.attrs, beside, dataset.parent.attrs, file.attrs])
+
+
+def _never_written(name: str, dataset: Any) -> Iterator[Remark]:
+    """Say of chunks that were never written, where they were read as numbers."""
+    if not dataset.chunks or not dataset.size or dataset.fillvalue != dataset.fillvalue:
+        return
+    chunks = math.prod(-(-extent // chunk) for extent, chunk in zip(dataset.shape, dataset.chunks, strict=True))
+    lacking = chunks - dataset.id.get_num_chunks()
+    if lacking:
+        yield Remark(f"{name}: {lacking} of {chunks} chunks were never written and were read as {dataset.fillvalue}")
 
 
 def _datasets(group: Any, prefix: str, h5py: Any) -> Iterator[tuple[str, Any]]:
