@@ -168,13 +168,13 @@ def fit_local_polynomials(
     bridged where their neighbours tell them as well as samples would, and estimates within a window of a missing one are made as below, in
     the best windows: on sums of sines with 1, 5 and 30 % of the samples missing at random the errors are 1.0 to 1.1, 1.0 to 1.2 and mostly
     1.2 to 1.8 (one of 36 records: 2.8) times those without a gap, and nominal 95 % intervals of the second derivative cover 66 to 90 %.
-    It takes two to five times as long where few windows hold a gap, and up to 100 times where nearly all do, as with 1 % missing at random
-    and windows of 800 samples for a slow motion: each takes some 10 µs then, of those at every `step`-th sample.
+    It takes two to five times as long where few windows hold a gap, and up to 40 times where nearly all do, as with 1 % missing at random
+    and windows of 800 samples for a slow motion: each takes some 4 µs then, of those at every `step`-th sample.
 
     With ``nan_policy="omit"`` a window that lacks samples is fitted by polynomials that are orthogonal on the others, and each derivative
     takes the order with the least estimated squared bias plus variance, since such a window is not symmetric. Its standard errors are those
     of that order with the bias; that the order was chosen is not in them, so that nominal 95 % intervals cover 80 to 95 %. A derivative
-    above the order is zero and has no standard error (NaN). This costs some 2 µs a window of 201 samples and thread.
+    above the order is zero and has no standard error (NaN). This costs some 1.4 µs a window of 201 samples and thread.
 
     Where `t` is not uniform every window has a design of its own, and derivatives are those at each sample's own time. A duration takes
     the samples that lie in it, however many; windows with fewer than 5 are NaN. ``"auto"`` chooses window and order of every derivative
@@ -184,7 +184,7 @@ def fit_local_polynomials(
     order without its bias: nominal 95 % intervals cover 84 to 96 %. ``"pooled"`` and ``"average"`` need uniform times. A window of
     51 to 2001 samples takes 0.15 to 0.8 µs with AVX2, where `step` is far below its length and at most five derivatives are asked for:
     neighbours share one basis. Standard errors take 0.2 to 0.9 µs, when they are asked for. At the ends, near gaps and outliers each is
-    fitted on its own, in some 2 µs with 201 samples, as all are where weights differ.
+    fitted on its own, in some 1.4 µs with 201 samples, as all are where weights differ.
 
     The cost is about 15 ns a sample and thread for any window length on a processor with AVX-512, about twice that with AVX2; averaged
     about twice as much; pooled about 300 ns, because the orders of every window need logarithms; ``"auto"`` about 5 µs a sample and
