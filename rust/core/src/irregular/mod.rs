@@ -1,6 +1,5 @@
 //! Samples whose times are not uniform: splines that bring channels onto a uniform grid, what that does to noise, and polynomials in windows.
 
-pub(crate) mod lists_in_lanes;
 pub(crate) mod passed_noise;
 pub(crate) mod resampling;
 pub(crate) mod shared_buffers;

@@ -2,11 +2,12 @@
 //!
 //! Since `2 T_i T_j = T_{i+j} + T_{|i-j|}`, the sums of `T_0 .. T_{2p}` are the normal matrix of all orders up to `p`.
 
+use crate::local_polynomials::options::HIGHEST_ORDER;
 use crate::simd::aligned::OnLines;
 use crate::simd::vectors::Lanes;
 
 /// Polynomials at most.
-pub(crate) const MOST: usize = 16;
+pub(crate) const MOST: usize = HIGHEST_ORDER + 1;
 
 /// Derivatives at most, the value among them.
 pub(crate) const DERIVATIVES: usize = 6;

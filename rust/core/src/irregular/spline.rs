@@ -8,7 +8,7 @@
 
 use std::ops::RangeInclusive;
 
-use crate::irregular::lists_in_lanes::{gather, one_by_one, side_by_side};
+use crate::lanes::lists::{gather, one_by_one, side_by_side};
 use crate::simd::aligned::Aligned;
 use crate::simd::instructions::Instructions;
 use crate::simd::vectors::{Kernel, Lanes, MOST_LANES, dispatch};

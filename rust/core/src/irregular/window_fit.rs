@@ -17,7 +17,7 @@ use crate::irregular::window_alone::AloneMemory;
 use crate::irregular::window_estimates::{WindowFit, WindowFits};
 use crate::irregular::window_places::{Numbered, PlacedWindow, WindowSpan, groups};
 use crate::local_polynomials::options::Order;
-use crate::local_polynomials::order_table::OrderTable;
+use crate::local_polynomials::order_table::OrderTables;
 use crate::simd::instructions::Instructions;
 use crate::simd::vectors::dispatch;
 
@@ -37,7 +37,7 @@ struct FitMemory {
     alone: AloneMemory,
     shared: GroupSamples,
     /// By length of the window.
-    tables: Vec<Option<Box<OrderTable>>>,
+    tables: OrderTables,
 }
 
 impl WindowFit {
@@ -98,7 +98,7 @@ impl WindowFit {
         let placed = self.span.places(&self.times, windows, numbered.step);
         let done = self.side_by_side(record, &placed, numbered, instructions, memory, &mut fits);
         let FitMemory { alone, tables, .. } = memory;
-        let table = |length: usize| tables[length].as_deref().expect("made for every window");
+        let table = |length: usize| tables.of(length);
         let passes = [(instructions, false), (instructions, true)];
         self.apart(record, &placed, numbered, (&done, &passes), (&table, alone), &mut fits);
     }
@@ -115,7 +115,7 @@ impl WindowFit {
     ) -> Vec<bool> {
         memory.make_tables(self.order, placed);
         let FitMemory { shared, tables, .. } = memory;
-        let table = |length: usize| tables[length].as_deref().expect("made for every window");
+        let table = |length: usize| tables.of(length);
         let degrees = |length: usize| {
             let degrees = table(length).degrees;
             let shares = self.weights.is_none() && length >= FEWEST.max(self.least);
@@ -144,11 +144,7 @@ impl FitMemory {
     /// Makes the tables of windows.
     fn make_tables(&mut self, order: Order, placed: &[PlacedWindow]) {
         for same in placed.chunk_by(|one, other| one.samples.len() == other.samples.len()) {
-            let length = same[0].samples.len();
-            if length >= self.tables.len() {
-                self.tables.resize(length + 1, None);
-            }
-            self.tables[length].get_or_insert_with(|| Box::new(OrderTable::new(order, length)));
+            self.tables.make(order, same[0].samples.len());
         }
     }
 }
@@ -238,7 +234,7 @@ mod tests {
         let mut memory = FitMemory::default();
         memory.make_tables(fit.order, placed);
         let FitMemory { alone, tables, .. } = &mut memory;
-        let table = |length: usize| tables[length].as_deref().expect("made for every window");
+        let table = |length: usize| tables.of(length);
         fit.apart(record, placed, EVERY, (done, &[(Instructions::Scalar, true)]), (&table, alone), &mut found.fits());
     }
 

@@ -15,7 +15,7 @@ use crate::exec::pool::{self, GoOn, Piece, Watch};
 use crate::local_polynomials::held_samples::{HeldSamples, HeldWindow};
 use crate::local_polynomials::incomplete_record::Incomplete;
 use crate::local_polynomials::options::Order;
-use crate::local_polynomials::order_table::OrderTable;
+use crate::local_polynomials::order_table::{OrderTable, OrderTables};
 use crate::local_polynomials::own_orders::OwnOrders;
 use crate::local_polynomials::plan::LocalPolynomials;
 use crate::local_polynomials::weighted_samples::{LONG, OwnPolynomials, WeightedMemory, WeightedSamples};
@@ -53,7 +53,7 @@ pub(crate) struct IncompleteMemory {
     held: HeldSamples,
     own: WeightedMemory,
     /// By samples that are there.
-    tables: Vec<Option<Box<OrderTable>>>,
+    tables: OrderTables,
     /// Time of every sample of a whole window.
     times: Vec<f64>,
 }
@@ -102,7 +102,7 @@ impl LocalPolynomials {
         let IncompleteMemory { held, own, tables, times } = memory;
         if times.len() != length {
             *times = (0..length).map(|sample| basis.position(sample) * scale).collect();
-            *tables = vec![None; length + 1];
+            *tables = OrderTables::default();
         }
         held.clear();
         let mut windows: Vec<HeldWindow> = Vec::with_capacity(places.len());
@@ -130,8 +130,7 @@ impl LocalPolynomials {
                     OwnWindows { memory: own, windows, degrees, derivatives, dependent: HARDLY_THERE, twice },
                 );
                 for (window, own) in some.iter().zip(&own.found).filter(|(_, own)| own.orthogonal) {
-                    let new = || Box::new(OrderTable::new(self.options().order, window.count));
-                    let table = tables[window.count].get_or_insert_with(new);
+                    let table = tables.make(self.options().order, window.count);
                     found[window.number] = Some(self.estimate_held(own, window, table));
                 }
             }

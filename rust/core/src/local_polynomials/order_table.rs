@@ -29,3 +29,22 @@ impl OrderTable {
         Self { length, degrees: weights.len(), weights, least: (-NEGLIGIBLE / length as f64).exp() }
     }
 }
+
+/// Tables of windows, by the samples that are there.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct OrderTables(Vec<Option<Box<OrderTable>>>);
+
+impl OrderTables {
+    /// The table of a length, made once.
+    pub(crate) fn make(&mut self, order: Order, length: usize) -> &OrderTable {
+        if length >= self.0.len() {
+            self.0.resize(length + 1, None);
+        }
+        self.0[length].get_or_insert_with(|| Box::new(OrderTable::new(order, length)))
+    }
+
+    /// The table of a length that was made.
+    pub(crate) fn of(&self, length: usize) -> &OrderTable {
+        self.0[length].as_deref().expect("made before it is asked for")
+    }
+}

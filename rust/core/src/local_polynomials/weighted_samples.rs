@@ -1,5 +1,6 @@
 //! Samples of windows that have polynomials of their own, laid side by side, and what is found in them.
 
+use crate::lanes::lists::lay;
 use crate::local_polynomials::options::HIGHEST_ORDER;
 use crate::simd::aligned::Aligned;
 use crate::simd::vectors::{Lanes, MOST_LANES};
@@ -85,31 +86,7 @@ impl WeightedMemory {
             (lists[0][lane], lists[1][lane], lists[2][lane]) = (window.times, window.weights, window.values);
         }
         for (all, lists) in [&mut self.times, &mut self.weights, &mut self.left].into_iter().zip(&lists) {
-            abreast(simd, &lists[..lanes], all);
-        }
-    }
-}
-
-/// Lays lists side by side; zeros follow those that are shorter.
-#[inline(always)]
-fn abreast<S: Lanes>(simd: S, lists: &[&[f64]], all: &mut Aligned) {
-    let lanes = S::F64_LANES;
-    let mut square = [simd.splat_f64s(0.0); MOST_LANES];
-    let count = all.len() / lanes;
-    let shortest = lists.iter().map(|list| list.len()).min().unwrap_or(0);
-    let whole = shortest / lanes * lanes;
-    for first in (0..whole).step_by(lanes) {
-        for (vector, list) in square[..lanes].iter_mut().zip(lists) {
-            *vector = simd.load(list, first);
-        }
-        simd.transpose(&mut square[..lanes]);
-        for (place, &vector) in (first..).zip(&square[..lanes]) {
-            simd.store(all, place * lanes, vector);
-        }
-    }
-    for place in whole..count {
-        for (lane, list) in lists.iter().enumerate() {
-            all[place * lanes + lane] = list.get(place).copied().unwrap_or(0.0);
+            lay(simd, &lists[..lanes], all);
         }
     }
 }
@@ -126,4 +103,12 @@ pub(crate) fn numbers_of<S: Lanes>(
         *one = number(window);
     }
     simd.load(&numbers, 0)
+}
+
+/// The numbers of a vector.
+#[inline(always)]
+pub(crate) fn numbers<S: Lanes>(simd: S, vector: S::f64s) -> [f64; MOST_LANES] {
+    let mut numbers = [0.0; MOST_LANES];
+    simd.store(&mut numbers, 0, vector);
+    numbers
 }

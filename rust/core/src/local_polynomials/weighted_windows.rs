@@ -11,9 +11,9 @@
 //! from the same numbers (Simon 1984, The Lanczos algorithm with partial reorthogonalization). Where few samples hold nearly all the weight,
 //! or orders come near the number of samples, it is too much: then every polynomial is made orthogonal to all before it, twice.
 
-use crate::local_polynomials::weighted_samples::{MOST, WeightedMemory, WeightedSamples, numbers_of};
+use crate::local_polynomials::weighted_samples::{MOST, WeightedMemory, WeightedSamples, numbers, numbers_of};
 use crate::local_polynomials::window_recurrence::Recurrence;
-use crate::simd::vectors::{Kernel, Lanes, MOST_LANES};
+use crate::simd::vectors::{Kernel, Lanes};
 
 /// Products of two polynomials of length 1 are taken for zero up to this.
 const ORTHOGONAL: f64 = 1e-12;
@@ -61,14 +61,6 @@ impl Kernel for OwnWindows<'_> {
         found.take_last(simd, self.memory, degrees, self.twice);
         self.collect(simd, degrees, &found);
     }
-}
-
-/// The numbers of a vector.
-#[inline(always)]
-fn numbers<S: Lanes>(simd: S, vector: S::f64s) -> [f64; MOST_LANES] {
-    let mut numbers = [0.0; MOST_LANES];
-    simd.store(&mut numbers, 0, vector);
-    numbers
 }
 
 impl OwnWindows<'_> {

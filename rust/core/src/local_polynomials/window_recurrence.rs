@@ -1,8 +1,8 @@
 //! The recurrence that polynomials follow which are orthogonal on the samples of a window, for windows side by side, one a lane.
 
-use crate::local_polynomials::weighted_samples::{MOST, WeightedMemory, WeightedSamples, numbers_of, unit_of};
+use crate::local_polynomials::weighted_samples::{MOST, WeightedMemory, WeightedSamples, numbers, numbers_of, unit_of};
 use crate::simd::aligned::{Aligned, OnLines};
-use crate::simd::vectors::{Lanes, MOST_LANES};
+use crate::simd::vectors::Lanes;
 
 /// What is known of windows side by side.
 pub(crate) struct Recurrence<S: Lanes> {
@@ -50,9 +50,7 @@ impl<S: Lanes> Recurrence<S> {
         for weight in memory.weights.chunks_exact(lanes) {
             greatest = simd.max_f64s(greatest, simd.load(weight, 0));
         }
-        let mut unit = [0.0; MOST_LANES];
-        simd.store(&mut unit, 0, greatest);
-        let unit = simd.load(&unit.map(unit_of), 0);
+        let unit = simd.load(&numbers(simd, greatest).map(unit_of), 0);
         let samples = memory.times.chunks_exact(lanes).zip(memory.weights.chunks_exact_mut(lanes));
         let columns = memory.columns[0].chunks_exact_mut(lanes);
         for (((time, weights), values), column) in samples.zip(memory.left.chunks_exact_mut(lanes)).zip(columns) {
@@ -168,7 +166,7 @@ impl<S: Lanes> Recurrence<S> {
                 *part = simd.add_f64s(*part, own);
             }
         }
-        if degree == 1 {
+        if taken.len() != MOST * MOST * lanes {
             *taken = Aligned::zeros(MOST * MOST * lanes);
         }
         for (other, &part) in parts.0.iter().enumerate().take(degree) {

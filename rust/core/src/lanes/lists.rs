@@ -1,31 +1,40 @@
 //! Lists of numbers laid side by side, one a lane, and one by one again.
 
+use std::array::from_fn;
+
 use crate::simd::aligned::Aligned;
 use crate::simd::vectors::{Lanes, MOST_LANES};
 
 /// Numbers of several lists, of which there are at most as many as lanes, one list a lane; the last list stands again in the lanes beyond.
 #[inline(always)]
 pub(crate) fn side_by_side<S: Lanes>(simd: S, lists: &[&[f64]], count: usize) -> Aligned {
+    let mut all = Aligned::zeros(count * S::F64_LANES);
+    let of_lanes: [&[f64]; MOST_LANES] = from_fn(|lane| lists[lane.min(lists.len() - 1)]);
+    lay(simd, &of_lanes[..S::F64_LANES], &mut all);
+    all
+}
+
+/// Lays a list for each lane side by side, as many numbers of each as there is room for; zeros follow those that are shorter.
+#[inline(always)]
+pub(crate) fn lay<S: Lanes>(simd: S, lists: &[&[f64]], all: &mut [f64]) {
     let lanes = S::F64_LANES;
-    let mut all = Aligned::zeros(count * lanes);
-    let list = |lane: usize| lists[lane.min(lists.len() - 1)];
+    let count = all.len() / lanes;
     let mut square = [simd.splat_f64s(0.0); MOST_LANES];
-    let whole = count / lanes * lanes;
+    let whole = lists.iter().map(|list| list.len()).min().unwrap_or(0).min(count) / lanes * lanes;
     for first in (0..whole).step_by(lanes) {
-        for (lane, vector) in square[..lanes].iter_mut().enumerate() {
-            *vector = simd.load(list(lane), first);
+        for (vector, list) in square[..lanes].iter_mut().zip(lists) {
+            *vector = simd.load(list, first);
         }
         simd.transpose(&mut square[..lanes]);
         for (place, &vector) in (first..).zip(&square[..lanes]) {
-            simd.store(&mut all, place * lanes, vector);
+            simd.store(all, place * lanes, vector);
         }
     }
     for place in whole..count {
-        for lane in 0..lanes {
-            all[place * lanes + lane] = list(lane)[place];
+        for (lane, list) in lists.iter().enumerate() {
+            all[place * lanes + lane] = list.get(place).copied().unwrap_or(0.0);
         }
     }
-    all
 }
 
 /// The numbers of the first lanes, one list for each, and then enough zeros for whole vectors.
