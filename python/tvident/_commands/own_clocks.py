@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -37,12 +37,8 @@ def check_own_clocks(
     """Refuse the clock of one channel for another that has a clock of its own, and say how to give both; warn beside a sample rate."""
     if torque_time is not None or file is None:
         return
-    of = _clock_in(file)
-    try:
-        clocks = [of(channels, full_name(channels, name, file)) for name in names]
-    except KeyError:
-        return  # of another file
-    if None in clocks or len(clocks) < 2 or _are_one(channels, clocks):  # noqa: PLR2004 - a motion and a torque
+    clocks = _clocks_of(channels, names, file)
+    if None in clocks or len(clocks) < 2 or _are_one(channels, clocks[0], clocks[-1]):  # noqa: PLR2004 - a motion, a torque
         return
     first, last = (printable(named_unit(str(one))[0]) for one in (clocks[0], clocks[-1]))
     if not takes_both:
@@ -67,24 +63,24 @@ def check_beside(
     """Refuse channels, by what messages call them, whose samples were taken at other times than those of the motion."""
     if file is None:
         return
-    of = _clock_in(file)
-    try:
-        own = of(channels, full_name(channels, motion, file))
-        clocks = {what: of(channels, full_name(channels, one, file)) for what, one in others.items() if one is not None}
-    except KeyError:
-        return  # of another file
-    for what, clock in clocks.items():
-        if own is not None and clock is not None and not _are_one(channels, [own, clock]):
+    beside = {what: name for what, name in others.items() if name is not None}
+    own, *clocks = _clocks_of(channels, [motion, *beside.values()], file) or [None]
+    for (what, name), clock in zip(beside.items(), clocks, strict=False):
+        if own is not None and clock is not None and not _are_one(channels, own, clock):
             first, other = (printable(named_unit(one)[0]) for one in (own, clock))
             raise click.UsageError(
                 f"{what} must have a sample for each of the motion; {printable(file)} has {first} for that and {other} for "
-                f"{printable(others[what] or '')}; resample one channel at the times of the other"
+                f"{printable(name)}; resample one channel at the times of the other"
             )
 
 
-def _clock_in(file: str) -> Callable[[recordings.Channels, str], str | None]:
-    """Return what finds the times of a channel in a file of this kind."""
-    return _clock_before if ending_of(Path(file)).lower() in _GROUPED else _clock_beside
+def _clocks_of(channels: recordings.Channels, names: Sequence[str], file: str) -> list[str | None]:
+    """Return the times of every channel, as a file of this kind says them; nothing where a channel is of another file."""
+    of = _clock_before if ending_of(Path(file)).lower() in _GROUPED else _clock_beside
+    try:
+        return [of(channels, full_name(channels, name, file)) for name in names]
+    except KeyError:
+        return []
 
 
 def _clock_beside(channels: recordings.Channels, name: str) -> str | None:
@@ -108,9 +104,9 @@ def _clock_before(channels: recordings.Channels, name: str) -> str | None:
     return None
 
 
-def _are_one(channels: recordings.Channels, clocks: Sequence[Any]) -> bool:
-    first, last = (channels[one] for one in (clocks[0], clocks[-1]))
-    if clocks[0] == clocks[-1] or np.array_equal(first, last):
+def _are_one(channels: recordings.Channels, clock: Any, other: Any) -> bool:
+    first, last = channels[clock], channels[other]
+    if clock == other or np.array_equal(first, last):
         return True
     if first.shape != last.shape or first.size < 2:  # noqa: PLR2004 - a step
         return False
