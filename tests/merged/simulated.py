@@ -102,6 +102,7 @@ class Masses:
     inertia: list[float]
 
 
+# All that records of chains may differ in.
 def chain(
     stiffness: list[Callable[[Array], Array]],
     samples: int,
@@ -110,9 +111,10 @@ def chain(
     driven: tuple[int, ...] | None = None,
     base: bool = False,
     angle_noise: float = 1e-3,
+    torque_noise: float = 0.1,
     highest: float = 12.0,
 ) -> Masses:
-    """Give masses in a row, the first held by a spring to the base, a damper beside every spring: torque SNR 20 dB."""
+    """Give masses in a row, the first held by a spring to the base, a damper beside every spring: torque SNR 20 dB by default."""
     rng = np.random.default_rng(seed)
     masses, step = len(stiffness), 1e-3 / FINER
     times = np.arange(2 * samples * FINER + 1) * step / 2
@@ -136,7 +138,7 @@ def chain(
     whole = slice(0, 2 * FINER * samples, 2 * FINER)
     return Masses(
         noisy(rng, angle, angle_noise),
-        noisy(rng, forces[:, whole], 0.1),
+        noisy(rng, forces[:, whole], torque_noise),
         noisy(rng, road[whole], angle_noise) if base else None,
         list(springs[:, whole]),
         list(damping),

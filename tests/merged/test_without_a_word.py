@@ -54,41 +54,6 @@ def wrong(found: Any, masses: Masses) -> dict[str, float]:
     }
 
 
-def with_coloured_torque(masses: Masses, seed: int) -> Array:
-    """Give torques whose noise, a tenth of them, forgets nine tenths from sample to sample."""
-    rng = np.random.default_rng(seed)
-    driving = masses.torque.std(axis=1, keepdims=True)
-    noise = rng.standard_normal(masses.torque.shape)
-    for sample in range(1, noise.shape[1]):
-        noise[:, sample] += 0.9 * noise[:, sample - 1]
-    return np.asarray(masses.torque + 0.1 * driving * noise * np.sqrt(1 - 0.81))
-
-
-@pytest.mark.slow
-@pytest.mark.first(1)
-@pytest.mark.parametrize(
-    ("masses", "driven", "spring"),
-    [
-        (2, None, constant(12.0)),
-        (2, (0,), constant(12.0)),
-        *long((3, None, constant(12.0)), (2, None, swinging), (2, (0,), swinging), (3, None, swinging)),
-    ],
-)
-def test_errors_know_noise_of_torques_that_is_stronger_where_the_motion_is(
-    masses: int, driven: tuple[int, ...] | None, spring: Any
-) -> None:
-    # Noise that is read at the highest frequencies is a tenth of it there: errors were 3 to 10 times too small, and 12 of 12 records had an
-    # element that changed.
-    errors = []
-    for seed in range(6):
-        rest = [constant(18.0 - 2 * place) for place in range(masses - 1)]
-        simulated = chain([spring, *rest], 8000, seed=seed, driven=driven)
-        found = identified(simulated, with_coloured_torque(simulated, seed + 100))
-        errors += list(wrong(found, simulated).values())
-    assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.6
-    assert np.mean(np.array(errors) < 2) > 0.88
-
-
 @pytest.mark.parametrize("amplitude", [0.05, *long(0.02, 0.1)])
 @pytest.mark.parametrize("changes", [0, 1])
 @pytest.mark.parametrize("options", [CONSTANTS, {"stiffness": ["constant", "constant"]}])

@@ -238,12 +238,12 @@ def _reasons_of(one: _core.MergedIdentification | FoundExpanded) -> list[str]:
     times = f"rows are predicted with {one.prediction_error:.2f} times the variance of the channels' noise"
     # What sums of functions leave stands in their own words.
     reasons = [function if isinstance(one, FoundExpanded) else f"{function}; {times}"]
-    colour = max(one.colours, default=1.0)
-    if colour > 1:
-        reasons.append(
-            f"the noise of an angle is {colour:.2g} times as strong at low frequencies as at the highest: products are corrected for it, "
-            "and errors are larger by it"
-        )
+    angles = len(one.noise[0])
+    for channel, colours in (("an angle", one.colours[:angles]), ("a torque", one.colours[angles:])):
+        if (colour := max(colours, default=1.0)) > 1:
+            corrected = "products are corrected for it, and " if channel == "an angle" else ""
+            strength = f"{colour:.2g} times as strong at low frequencies as at the highest"
+            reasons.append(f"the noise of {channel} is {strength}: {corrected}errors are larger by it")
     if one.scan.plateau is not None:
         first, last = (one.scan.window_length[place] for place in one.scan.plateau)
         reasons.append(

@@ -150,7 +150,7 @@ impl MergedSession<'_, '_, '_> {
             self.merged.elements.iter().any(|one| one.known.is_none() && one.entries.iter().any(of))
         });
         let noise = [self.noise[0][channel], self.noise[1][equation]];
-        let colour = &self.colours[channel];
+        let colour = &self.colours[0][channel];
         let density = |bin: usize| colour.density(2.0 * PI * bin as f64 / length as f64);
         let coloured = (!colour.is_white()).then(|| (0..power.len()).map(density).collect());
         Ok(Evidence { power, samples, noise, coloured, delta: self.options.delta, unknown })

@@ -1,4 +1,8 @@
-//! The colour of the angles' noise: how much of it the equations bear out.
+//! The colour of the noise of angles and torques: how much of it the equations bear out.
+//!
+//! The noise of a torque may be stronger where the motion is than at the highest frequencies, where it is read: errors of constants and tests of whether
+//! they change rest on what it is there. But a drive that is rough, as random signs are or what goes through a filter, looks like such a noise. So all noise
+//! of torques is white at first, and has as much of the colour that its channel shows as is left of its equation.
 
 use crate::error::Error;
 use crate::exec::pool::Piece;
@@ -6,49 +10,78 @@ use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::session::MergedSession;
 use crate::noise::colour::coloured_noise;
 use crate::noise::correlated::CorrelatedNoise;
+use crate::regression::limits::NOISE_MODEL_FAILS;
 
 /// What is left, over the noise's, from which on down it is less than the noise: windows that follow some of it leave three quarters.
 const LESS: f64 = 0.7;
 
-/// The noise of every angle: of that of the trials the mean.
-pub(crate) fn colours_of(session: &mut MergedSession<'_, '_, '_>) -> Result<Vec<CorrelatedNoise>, Error> {
-    let white = || session.noise[0].iter().map(|&variance| CorrelatedNoise::white(variance));
+/// The part of the noise that a torque's channel shows which must be left of its equation: between the highest frequencies and the motion a channel tells
+/// its noise where the motion is to a factor of two or three, and a rough drive hardly leaves a tenth.
+const BORNE_OUT: f64 = 0.25;
+
+/// The noise of every angle, and of every torque, as the channels show it: of that of the trials the mean.
+pub(crate) fn colours_of(session: &mut MergedSession<'_, '_, '_>) -> Result<[Vec<CorrelatedNoise>; 2], Error> {
+    let [angles, torques] = &session.noise;
+    let white = |variances: &[f64]| variances.iter().map(|&variance| CorrelatedNoise::white(variance)).collect();
     if session.options.noise.is_some() || session.merged.trials.iter().any(|trial| trial.weights.is_some()) {
-        return Ok(white().collect());
+        return Ok([white(angles), white(torques)]);
     }
     let instructions = session.options.instructions;
-    let (channels, variances) = (session.merged.channels(), session.noise[0].clone());
-    let angles = session.merged.trials.iter().flat_map(|trial| trial.angles.iter().zip(&variances));
-    let pieces = angles.map(|(angle, variance)| Piece { size: angle.len(), content: (*angle, *variance) });
-    let colour = |(angle, variance), (): &mut ()| coloured_noise(angle, variance, instructions);
+    let variances = [angles.as_slice(), torques].concat();
+    let each = session.merged.trials.iter().flat_map(|trial| trial.angles.iter().chain(&trial.torques));
+    let pieces = each.zip(variances.iter().cycle());
+    let pieces = pieces.map(|(channel, variance)| Piece { size: channel.len(), content: (*channel, *variance) });
+    let colour = |(channel, variance), (): &mut ()| coloured_noise(channel, variance, instructions);
     let found = session.stages.map(pieces.collect(), || (), colour)?;
-    let of = |channel: usize| {
-        let each: Vec<_> = found.iter().skip(channel).step_by(channels).collect();
+    let of = |place: usize| {
+        let each: Vec<_> = found.iter().skip(place).step_by(variances.len()).collect();
         // Short trials, or one that moves too fast, do not tell.
         let told: Vec<_> = each.iter().copied().filter(|noise| !noise.is_white()).collect();
         if 2 * told.len() > each.len() {
             CorrelatedNoise::mean(&told)
         } else {
-            CorrelatedNoise::white(variances[channel])
+            CorrelatedNoise::white(variances[place])
         }
     };
-    Ok((0..channels).map(of).collect())
+    let channels = session.merged.channels();
+    Ok([(0..channels).map(of).collect(), (channels..variances.len()).map(of).collect()])
 }
 
 impl MergedSession<'_, '_, '_> {
+    /// Gives the noise of torques as much of the colour that their channels show as is left of their equations. Returns whether any has it.
+    pub(crate) fn colour_torques(&mut self, fitted: &MergedFit, shown: &[CorrelatedNoise]) -> Result<bool, Error> {
+        if shown.iter().all(CorrelatedNoise::is_white) || fitted.misfit > NOISE_MODEL_FAILS {
+            return Ok(false);
+        }
+        let left = self.left_of_equations(&fitted.model, &fitted.fit)?;
+        let white = std::mem::replace(&mut self.colours[1], shown.to_vec());
+        let [of_white, of_shown] = [&white, &shown.to_vec()].map(|colours| {
+            self.colours[1].clone_from(colours);
+            self.noise_of_equations()
+        });
+        let mut has_colour = false;
+        for (equation, white) in white.into_iter().enumerate() {
+            let part = left[equation] * of_white[equation] / of_shown[equation];
+            let is_borne_out = !shown[equation].is_white() && part >= BORNE_OUT;
+            self.colours[1][equation] = if is_borne_out { shown[equation].with_part(part.min(1.0)) } else { white };
+            has_colour |= is_borne_out;
+        }
+        Ok(has_colour)
+    }
+
     /// Takes less of the colour of the angles' noise where equations leave less than it makes: where noise is strong, slow motion is taken for
     /// a part of it. Returns whether it does.
     pub(crate) fn fade(&mut self, fitted: &MergedFit) -> bool {
-        if fitted.error >= LESS || self.colours.iter().all(CorrelatedNoise::is_white) {
+        if fitted.error >= LESS || self.colours[0].iter().all(CorrelatedNoise::is_white) {
             return false;
         }
         let of_all = self.covariance().1.variance;
-        let white = self.colours.iter().map(|noise| noise.with_part(0.0)).collect();
-        let all = std::mem::replace(&mut self.colours, white);
+        let white = self.colours[0].iter().map(|noise| noise.with_part(0.0)).collect();
+        let all = std::mem::replace(&mut self.colours[0], white);
         let of_white = self.covariance().1.variance;
         let part = (fitted.error * of_all - of_white) / (of_all - of_white);
         let is_less = part < 1.0;
-        self.colours = if is_less { all.iter().map(|noise| noise.with_part(part.max(0.0))).collect() } else { all };
+        self.colours[0] = if is_less { all.iter().map(|noise| noise.with_part(part.max(0.0))).collect() } else { all };
         is_less
     }
 }

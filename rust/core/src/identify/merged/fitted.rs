@@ -170,6 +170,14 @@ impl MergedSession<'_, '_, '_> {
         }
     }
 
+    /// Chooses the test function, and settles what is asked for with it.
+    pub(crate) fn chosen_and_settled(&mut self) -> Result<Option<MergedFit>, Error> {
+        self.jumps.clear();
+        self.choose()?;
+        let model = self.model();
+        self.settle(&model)
+    }
+
     /// Decides, finds jumps and decides again with windows that end there, until no jump is new.
     pub(crate) fn settle(&mut self, model: &Model) -> Result<Option<MergedFit>, Error> {
         let Some(mut fitted) = self.decide(model)? else { return Ok(None) };

@@ -13,6 +13,7 @@ use crate::identify::merged::interleaved::{Interleaved, Weights};
 use crate::identify::merged::session::{EXPONENT, MergedSession};
 use crate::identify::merged::system::{Merged, MergedOptions};
 use crate::identify::scanned::Scan;
+use crate::noise::correlated::CorrelatedNoise;
 use crate::weak_form::test_function::{LEAST_HALF_WIDTH, TestFunction};
 
 /// Stages of a call, about: only for showing progress.
@@ -52,7 +53,7 @@ fn identify_within(
         is_decided: false,
         has_few_times: false,
         freed: Vec::new(),
-        colours: Vec::new(),
+        colours: [Vec::new(), Vec::new()],
         parameters: merged.elements.iter().map(|element| element.known.unwrap_or(0.0)).collect(),
         weights: Weights { angles: Vec::new(), equations: Vec::new() },
         all,
@@ -64,18 +65,21 @@ fn identify_within(
         stages,
     };
     session.noise = noise_of(&mut session)?;
-    session.colours = colours_of(&mut session)?;
-    session.choose()?;
-    let model = session.model();
-    let Some(mut fitted) = session.settle(&model)? else { return session.nothing() };
+    let [angles, torques] = colours_of(&mut session)?;
+    let white = session.noise[1].iter().map(|&variance| CorrelatedNoise::white(variance)).collect();
+    session.colours = [angles, white];
+    let Some(mut fitted) = session.chosen_and_settled()? else { return session.nothing() };
+    if session.colour_torques(&fitted, &torques)? {
+        // What was set free may have followed noise.
+        session.freed.clear();
+        let Some(again) = session.chosen_and_settled()? else { return session.nothing() };
+        fitted = again;
+    }
     for _ in 0..FADINGS {
         if !session.fade(&fitted) {
             break;
         }
-        session.jumps.clear();
-        session.choose()?;
-        let model = session.model();
-        let Some(again) = session.settle(&model)? else { return session.nothing() };
+        let Some(again) = session.chosen_and_settled()? else { return session.nothing() };
         fitted = again;
     }
     let fitted = session.over_few_times(fitted)?;

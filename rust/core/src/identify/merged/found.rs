@@ -46,7 +46,8 @@ pub struct MergedFound {
     pub changes_in_common: bool,
     /// Variances of the noise of every angle and every torque.
     pub noise: (Vec<f64>, Vec<f64>),
-    /// How many times as strong the noise of every angle is at the lowest frequencies as at the highest, where those variances are read.
+    /// How many times as strong the noise of every angle, and then of every torque, is at the lowest frequencies as at the highest, where those variances
+    /// are read.
     pub colours: Vec<f64>,
     /// What was found of every unknown, in the order of the elements.
     pub elements: Vec<FoundElement>,

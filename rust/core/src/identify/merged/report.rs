@@ -367,7 +367,12 @@ impl MergedSession<'_, '_, '_> {
             misfit: 1.0,
             changes_in_common: false,
             noise: (self.noise[0].clone(), self.noise[1].clone()),
-            colours: self.colours.iter().map(|noise| (noise.density(0.0) / noise.density(PI)).max(1.0)).collect(),
+            colours: self
+                .colours
+                .iter()
+                .flatten()
+                .map(|noise| (noise.density(0.0) / noise.density(PI)).max(1.0))
+                .collect(),
             elements: self.merged.unknowns().into_iter().map(unknown).collect(),
             constants: Vec::new(),
             covariance: Vec::new(),

@@ -43,8 +43,8 @@ pub(crate) struct MergedSession<'a, 'b, 'c> {
     pub(crate) has_few_times: bool,
     /// Elements that are windowed although nobody asked for it, since constants leave too much.
     pub(crate) freed: Vec<usize>,
-    /// The noise of every angle with its colour.
-    pub(crate) colours: Vec<CorrelatedNoise>,
+    /// The noise of every angle, and of every torque, with its colour.
+    pub(crate) colours: [Vec<CorrelatedNoise>; 2],
     /// The elements' values as far as they are known, those of windowed ones about.
     pub(crate) parameters: Vec<f64>,
     pub(crate) weights: Weights,
@@ -159,21 +159,22 @@ impl MergedSession<'_, '_, '_> {
     fn weights_now(&self) -> Weights {
         let each = self.noise_of_equations().into_iter().enumerate();
         let equations = each.map(|(equation, variance)| 1.0 / (variance * self.factor_of(equation)).sqrt()).collect();
-        let angles = self.colours.iter().map(|noise| self.all.columns_of(noise)).collect();
+        let angles = self.colours[0].iter().map(|noise| self.all.columns_of(noise)).collect();
         Weights { angles, equations }
     }
 
     /// The variance of the noise of every equation with the parameters at hand.
     pub(crate) fn noise_of_equations(&self) -> Vec<f64> {
         let equations = self.merged.equations();
-        let torque = products(&self.all.kernels.values[2], &self.all.kernels.values[2], 0);
+        let torque = &self.all.kernels.values[2];
         let variance = |equation: usize| {
             let of_angles = (0..self.merged.channels()).map(|channel| {
                 let mixed = self.mixed(equation, channel);
-                let (factor, noisy) = noisy(&self.colours[channel], &mixed);
+                let (factor, noisy) = noisy(&self.colours[0][channel], &mixed);
                 factor * products(&mixed, &noisy, 0)
             });
-            self.noise[1][equation] * torque + of_angles.sum::<f64>()
+            let (factor, noisy) = noisy(&self.colours[1][equation], torque);
+            factor * products(torque, &noisy, 0) + of_angles.sum::<f64>()
         };
         let each: Vec<f64> = (0..equations).map(variance).collect();
         let least = self.least_variance(&each);
@@ -224,24 +225,25 @@ impl MergedSession<'_, '_, '_> {
         let mixed: Vec<Vec<Vec<f64>>> = (0..equations)
             .map(|equation| (0..channels).map(|channel| self.mixed(equation, channel)).collect())
             .collect();
-        let noisy: Vec<Vec<(f64, Vec<f64>)>> = mixed
+        let of_angles: Vec<Vec<(f64, Vec<f64>)>> = mixed
             .iter()
-            .map(|each| each.iter().zip(&self.colours).map(|(kernel, noise)| noisy(noise, kernel)).collect())
+            .map(|each| each.iter().zip(&self.colours[0]).map(|(kernel, noise)| noisy(noise, kernel)).collect())
             .collect();
+        let of_torques: Vec<_> = self.colours[1].iter().map(|noise| noisy(noise, torque)).collect();
         let weights = &self.weights.equations;
         // Between a row of one equation and a row of another so many times later.
         let between = |one: usize, other: usize, times: usize| {
-            let of_angles = (0..channels)
+            let from_angles = (0..channels)
                 .map(|channel| {
-                    let (factor, noisy) = &noisy[one][channel];
+                    let (factor, noisy) = &of_angles[one][channel];
                     factor * products(&mixed[other][channel], noisy, times * stride)
                 })
                 .sum::<f64>();
-            let of_torque =
-                if one == other { self.noise[1][one] * products(torque, torque, times * stride) } else { 0.0 };
-            weights[one] * weights[other] * (of_angles + of_torque)
+            let (factor, noisy) = &of_torques[one];
+            let of_torque = if one == other { factor * products(torque, noisy, times * stride) } else { 0.0 };
+            weights[one] * weights[other] * (from_angles + of_torque)
         };
-        let memory = self.colours.iter().map(|noise| memory(noise, torque.len())).max().unwrap_or(0);
+        let memory = self.colours.iter().flatten().map(|noise| memory(noise, torque.len())).max().unwrap_or(0);
         let times = (torque.len() + memory).div_ceil(stride);
         let distances = (times - 1) * group + equations;
         let mut lags = vec![0.0; distances * equations];
@@ -255,7 +257,10 @@ impl MergedSession<'_, '_, '_> {
             }
         }
         let of_torque = (0..equations)
-            .map(|one| weights[one].powi(2) * self.noise[1][one] * products(torque, torque, 0) / equations as f64)
+            .map(|one| {
+                let (factor, noisy) = &of_torques[one];
+                weights[one].powi(2) * factor * products(torque, noisy, 0) / equations as f64
+            })
             .sum();
         let known = if (0..equations).all(|one| lags[one] <= 0.0) {
             // Without any noise rows count as if each had some of its own.
