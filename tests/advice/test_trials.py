@@ -123,12 +123,13 @@ def rubbing() -> tuple[Any, Any, Any]:
 
 
 def test_what_a_part_finds_elsewhere_is_compared_with_the_whole_record_there() -> None:
-    """Beside dry friction a damping that drifts is 16 errors off; a part hardly tells it, as it is nearly constant there."""
+    """Beside dry friction a damping that drifts was 16 errors off; a part hardly tells it, as it is nearly constant there."""
     angle, torque, damping = rubbing()
     result = tvident.identify(angle, torque, sample_rate=500)
     off = result.damping - damping
     advice = next(line for line in result.advice if "coulomb" in line)
-    assert np.median(np.abs(off) / result.stderr["damping"]) > 5
+    # Errors hold what the friction changes.
+    assert np.median(np.abs(off) / result.stderr["damping"]) < 1.5
     found = re.search(r"damping becomes ([0-9.]+) ± ([0-9.]+) N m s/rad at ([0-9.]+)-([0-9.]+) s", advice)
     assert found is not None, advice
     value, error, begin, end = map(float, found.groups())

@@ -21,16 +21,19 @@ use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows, mean};
 /// Where next to nothing is left to explain, a lag is none that is below a fifth of what a drive makes that holds each torque for a sample.
 const LEAST_LAG: f64 = 0.1;
 
+/// Standard errors from which on a term or a lag may be there, though it is not worth a word yet: little friction is much of a damping beside it.
+const MAY_BE_THERE: f64 = 3.0;
+
 /// What may have been left out, and what unknowns change by with every sample that the torque is later.
 #[derive(Default)]
 pub(crate) struct Suspected {
     pub(crate) each: Vec<Suspect>,
     pub(crate) with_lag: Vec<(usize, f64)>,
-    /// What the constants, those that change slowly first, would change by: with the lag, and with the most conspicuous term.
+    /// What the constants, those that change slowly first, would change by: with the lag, and with the most conspicuous term, if they may be there.
     pub(crate) changes: Vec<Vec<f64>>,
 }
 
-/// What is conspicuous, and what the constants would change by with it.
+/// What may be there, and what the constants would change by with it.
 #[derive(Default)]
 struct Changes {
     lag: Option<(Suspect, Vec<f64>)>,
@@ -38,11 +41,11 @@ struct Changes {
 }
 
 impl Changes {
-    /// Takes a suspect, if it is conspicuous and, of two terms, the more so: both may have one cause.
+    /// Takes a suspect, if it may be there and, of two terms, the more conspicuous: both may have one cause.
     fn add(&mut self, suspect: Suspect, by: Vec<f64>) {
         let certainty = |one: &Suspect| (one.value / one.error).abs();
         let place = if suspect.missing == Missing::Lag { &mut self.lag } else { &mut self.term };
-        let before = place.as_ref().map_or(CONSPICUOUS, |(before, _)| certainty(before));
+        let before = place.as_ref().map_or(MAY_BE_THERE, |(before, _)| certainty(before));
         if certainty(&suspect) > before {
             *place = Some((suspect, by));
         }
@@ -68,12 +71,18 @@ impl Changes {
 struct RowsToJudge {
     weak: WeakRows,
     rhs: Vec<f64>,
-    /// The first regressor that may be missing, and the one after the last: there is what follows the torque's rate where something varies slowly.
+    /// The first regressor that may be missing, and the one after the last.
     first: usize,
     end: usize,
-    /// What varies slowly follows a lag by, where that is known.
-    followed: Option<Vec<f64>>,
+    /// How what varies slowly follows each, where that is known; nothing of what the torque tells.
+    followed: Vec<Option<Follows>>,
     are_some: bool,
+}
+
+/// What varies slowly follows a regressor by, and which regressor it makes of that, if it does.
+struct Follows {
+    by: Vec<f64>,
+    regressor: Option<usize>,
 }
 
 impl Session<'_, '_, '_> {
@@ -87,9 +96,9 @@ impl Session<'_, '_, '_> {
         errors: &Errors,
     ) -> Result<Suspected, Error> {
         let mut candidates = self.candidates();
-        // A term hardly matters where next to nothing is left for it to explain. A lag does: next to nothing of the torque may be much of the damping.
+        // What the torque tells hardly matters where next to nothing is left for it to explain. A term or a lag does: that may be much of the damping.
         let is_explained = errors.is_explained(&all.rows);
-        candidates.retain(|one| !is_explained || *one == Missing::Lag);
+        candidates.retain(|one| !(is_explained && one.is_of_torque()));
         if !self.options.diagnose || candidates.is_empty() {
             return Ok(Suspected::default());
         }
@@ -116,14 +125,11 @@ impl Session<'_, '_, '_> {
         let (mut with_lag, mut changes, unknowns) = (Vec::new(), Changes::default(), self.unknowns());
         for (place, missing) in candidates.iter().enumerate().filter(|(_, missing)| !missing.is_of_torque()) {
             let is_lag = *missing == Missing::Lag;
-            if is_lag && followed.is_none() {
-                continue;
-            }
-            // A lag is judged beside what follows it: where the curve of what varies slowly is hardly told, it follows anything, and what it is wrong by
-            // looks like a lag.
-            let follows = is_lag && followed.as_ref().is_some_and(|by| !by.is_empty());
-            let regressors = if follows { vec![end, first + place] } else { vec![first + place] };
+            let Some(follows) = &followed[place] else { continue };
+            // What varies slowly has taken a part of what is missing. It is judged beside what follows it: where the curve is hardly told, it follows
+            // anything, and what it is wrong by looks like a lag.
             let place = first + place;
+            let regressors: Vec<usize> = follows.regressor.into_iter().chain([place]).collect();
             let judged = JudgedTerm {
                 rows: &weak.rows,
                 model: &decided.model,
@@ -139,30 +145,26 @@ impl Session<'_, '_, '_> {
             let found = judged.factors_and_changes(&regressors, &mut self.stages)?;
             let Some((factors, mut by_one)) = found else { continue };
             let Some((value, error)) = factors.last().copied() else { continue };
-            let share_that_follows = if follows { by_one.pop().unwrap_or(0.0) } else { 0.0 };
-            // A term that is next to nothing of the torque need not be there; a lag is little of it, and much of the damping.
-            let share = value * value * weak.rows.mean_square_of(place);
-            if !is_lag && share < NEGLIGIBLE * weak.rows.mean_square() {
-                continue;
-            }
+            let share_that_follows = follows.regressor.and_then(|_| by_one.pop()).unwrap_or(0.0);
             let unit = if is_lag { -1.0 / self.options.delta } else { 1.0 };
-            if is_explained && (unit * value).abs() < LEAST_LAG && value.abs() > CONSPICUOUS * error {
+            if is_lag && is_explained && (unit * value).abs() < LEAST_LAG && value.abs() > CONSPICUOUS * error {
                 // What sums over samples leave of integrals.
                 continue;
             }
             let suspect = Suspect { missing: *missing, value: unit * value, error: unit.abs() * error };
             // What varies slowly comes first.
-            let slow: Vec<f64> = match &followed {
-                Some(by) if is_lag => by.iter().map(|by| share_that_follows * by).collect(),
-                _ => vec![0.0; decided.slow.len()],
-            };
-            let by_one: Vec<f64> = slow.into_iter().chain(by_one).collect();
+            let by_one: Vec<f64> = follows.by.iter().map(|by| share_that_follows * by).chain(by_one).collect();
             if is_lag {
                 let each = decided.ordered().constant.into_iter().zip(by_one.iter().map(|one| one / unit));
                 with_lag = each.filter(|(one, _)| unknowns.contains(one)).collect();
             }
             changes.add(suspect, by_one.into_iter().map(|one| value * one).collect());
-            suspects.push(suspect);
+            // A term that is next to nothing of the torque, or has next to nothing left to explain, need not be there; a lag is little of it, and much of
+            // the damping.
+            let share = value * value * weak.rows.mean_square_of(place);
+            if is_lag || !(is_explained || share < NEGLIGIBLE * weak.rows.mean_square()) {
+                suspects.push(suspect);
+            }
         }
         let changes = changes.finish(all.function.half_width() as f64, decided.ordered().constant.len());
         Ok(Suspected { each: suspects, with_lag, changes })
@@ -178,10 +180,7 @@ impl Session<'_, '_, '_> {
     ) -> Result<RowsToJudge, Error> {
         let stretches = stretches_to_judge(all, decided, fit);
         let more = self.regressors_of(candidates, all, stretches.as_deref())?;
-        let lag = match candidates.iter().position(|one| *one == Missing::Lag) {
-            Some(place) => self.lag_beside_slow(all, &more[place], stretches.as_deref(), decided)?,
-            None => None,
-        };
+        let beside = self.each_beside_slow(all, (candidates, &more), stretches.as_deref(), decided)?;
         let rhs = decided.rhs(&all.rows);
         let (rows, rhs) = match &stretches {
             Some(stretches) => (thinned_rows(&all.rows, stretches), thinned_column(rhs, stretches)),
@@ -191,34 +190,47 @@ impl Session<'_, '_, '_> {
         let first = weak.rows.regressors.len();
         weak.rows.regressors.extend(more);
         let end = weak.rows.regressors.len();
-        let followed = lag.map(|Followed { left, by }| {
-            if !by.is_empty() {
-                let rate = &weak.rows.regressors[end - 1];
-                let value = rate.value.iter().zip(left).map(|(rate, left)| rate - left).collect();
-                let (companion, noise) = (rate.companion.clone(), rate.noise.clone());
-                weak.rows.regressors.push(Regressor { value, companion, noise });
-            }
-            by
-        });
+        let mut followed = Vec::new();
+        for (place, one) in beside.into_iter().enumerate() {
+            followed.push(one.map(|Followed { left, by }| {
+                let regressor = (!by.is_empty()).then_some(weak.rows.regressors.len());
+                if regressor.is_some() {
+                    let one = &weak.rows.regressors[first + place];
+                    let value = one.value.iter().zip(left).map(|(value, left)| value - left).collect();
+                    let (companion, noise) = (one.companion.clone(), one.noise.clone());
+                    weak.rows.regressors.push(Regressor { value, companion, noise });
+                }
+                Follows { by, regressor }
+            }));
+        }
         weak.rows.clear_unusable();
         Ok(RowsToJudge { weak, rhs, first, end, followed, are_some: stretches.is_some() })
     }
 
-    /// What is left of the torque's rate where what varies slowly follows it, in the rows of some stretches or in all.
-    fn lag_beside_slow(
+    /// What is left of each that may be missing where what varies slowly follows it, in the rows of some stretches or in all.
+    fn each_beside_slow(
         &mut self,
         weak: &WeakRows,
-        rate: &Regressor,
+        (candidates, more): (&[Missing], &[Regressor]),
         stretches: Option<&[Range<usize>]>,
         decided: &Decided,
-    ) -> Result<Option<Followed>, Error> {
-        let Some(stretches) = stretches.filter(|_| decided.found.is_some()) else {
-            return self.beside_slow(&weak.rows, &rate.value, decided);
-        };
+    ) -> Result<Vec<Option<Followed>>, Error> {
         // Curves are over the whole record.
-        let whole = self.regressors_of(&[Missing::Lag], weak, None)?;
-        let followed = self.beside_slow(&weak.rows, &whole[0].value, decided)?;
-        Ok(followed.map(|Followed { left, by }| Followed { left: thinned_column(&left, stretches), by }))
+        let stretches = stretches.filter(|_| decided.found.is_some());
+        let mut each = Vec::new();
+        for (&missing, regressor) in candidates.iter().zip(more) {
+            let one = if missing.is_of_torque() {
+                None
+            } else if let Some(stretches) = stretches {
+                let whole = self.regressors_of(&[missing], weak, None)?;
+                let followed = self.beside_slow(&weak.rows, &whole[0].value, decided)?;
+                followed.map(|Followed { left, by }| Followed { left: thinned_column(&left, stretches), by })
+            } else {
+                self.beside_slow(&weak.rows, &regressor.value, decided)?
+            };
+            each.push(one);
+        }
+        Ok(each)
     }
 
     /// The regressors of what may be missing, in all rows or in those of some stretches.
@@ -299,7 +311,7 @@ mod tests {
         let (little, much) = (vec![1.0, 0.0], vec![0.0, -3.0]);
         let of_terms = changes(&[(term(0), 6.0, little.clone()), (term(1), -9.0, much.clone())]);
         assert_eq!(of_terms, std::slice::from_ref(&much));
-        assert_eq!(changes(&[(term(0), 4.9, little.clone()), (Missing::Lag, f64::NAN, much.clone())]), [[0.0; 2]; 0]);
+        assert_eq!(changes(&[(term(0), 2.9, little.clone()), (Missing::Lag, f64::NAN, much.clone())]), [[0.0; 2]; 0]);
         // As much again as half of the part of the half-width, and a sixth of its square, and so on.
         let of_lag = changes(&[(Missing::Lag, -5.0, little.clone()), (Missing::Lag, -8.0, little.clone())]);
         assert!((of_lag[0][0] - 0.8_f64.exp_m1() / 0.8).abs() < 4.0 * f64::EPSILON, "{of_lag:?}");
