@@ -183,7 +183,9 @@ pub(crate) fn find(
     let rest = Model { constant: model.constant[coefficients..].to_vec(), ..model.clone() };
     let whole = rows.len() as f64;
     let ends = breaks.iter().copied().chain([rows.len()]);
-    let shortest = std::iter::once(0).chain(breaks.iter().copied()).zip(ends).map(|(start, end)| end - start).min();
+    // A jump may lie behind the last row.
+    let stretches = std::iter::once(0).chain(breaks.iter().copied()).zip(ends);
+    let shortest = stretches.filter_map(|(start, end)| end.checked_sub(start)).min();
     let mut most = (shortest.unwrap_or(0) / STRETCH).min(search.longest.unwrap_or(usize::MAX));
     let shortened = |scale: Scale, most: usize| {
         let short = scales.iter().rev().find(|one| one.span() <= most);
@@ -372,6 +374,16 @@ mod tests {
         // What is better than hopeless takes as many as ever.
         assert_eq!(found(2.0).error.to_bits(), all.error.to_bits());
         assert_ne!(first.error.to_bits(), all.error.to_bits());
+    }
+
+    #[test]
+    fn a_jump_behind_the_last_row_parts_nothing() {
+        let (rows, scales, model) = (changing(), Scale::all(ROWS, 3), model());
+        let found = |breaks: &[usize]| {
+            let search = SlowSearch { breaks, ..search(&rows, &model, &scales) };
+            staged(|stages| find(&search, scales[2], stages)).expect("a curve").equations_of.span()
+        };
+        assert_eq!(found(&[ROWS + 1]), found(&[]));
     }
 
     #[test]
