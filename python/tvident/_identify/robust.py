@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._huber import clip_residuals, has_heavy_tails
+from tvident._huber import Clipped, clip_residuals, has_heavy_tails
 from tvident._identify.data import Data
 from tvident._results import Identification, predicted_at_samples
 
@@ -18,7 +18,8 @@ LossAsked: TypeAlias = Literal["squares", "huber", "auto"]
 
 _ROUNDS = 10
 _SETTLED = 0.02
-"""Rounds end where what was clipped moves by no more than this part of the scale: far below any standard error."""
+"""Rounds end where what was clipped moves by no more than this part of the scale: far below any standard error. They end too where it comes
+back to what it was two rounds before: two choices of windows take turns there, and would until the last round."""
 
 
 def loss_of(given: LossAsked | None, settings: Mapping[str, Any] | None) -> LossAsked:
@@ -46,6 +47,7 @@ def with_clipped_torque(data: Data, loss: LossAsked, identified: Callable[[Data]
     samples = data.time.size
     recorded = data.torques.reshape(-1, samples).astype(np.float64)
     torques, shares = recorded.copy(), np.zeros(data.records)
+    before = recorded.copy()
     open_records = list(range(data.records))
     for turn in range(_ROUNDS):
         found = identified(replace(data, torques=torques.reshape(data.torques.shape)))
@@ -58,16 +60,28 @@ def with_clipped_torque(data: Data, loss: LossAsked, identified: Callable[[Data]
                 open_records.remove(record)
                 continue
             clipped = clip_residuals(given, predicted)
-            with np.errstate(invalid="ignore"):  # infinite samples stay as they are
-                moved = np.abs(clipped.values - torques[record] * root)
             # Where the prediction is far noisier than the sample, that stays as it is.
             kept = np.where(np.isnan(root), recorded[record], clipped.values / root)
-            torques[record], shares[record] = kept, clipped.share
-            if not np.nanmax(moved, initial=0.0) > _SETTLED * clipped.scale:
+            is_settled = not _differs(clipped, torques[record] * root)
+            if not is_settled and turn > 1 and not _differs(clipped, before[record] * root):
+                is_settled = True
+                if (_ROUNDS - 1 - turn) % 2 == 1:
+                    # The last round would be one of the others.
+                    kept, clipped = torques[record], replace(clipped, share=shares[record])
+            before[record], torques[record] = torques[record], kept
+            shares[record] = clipped.share
+            if is_settled:
                 open_records.remove(record)
         if not open_records:
             break
     return replace(data, torques=torques.reshape(data.torques.shape), clipped=tuple(shares.tolist()))
+
+
+def _differs(clipped: Clipped, values: npt.NDArray[np.float64]) -> bool:
+    """Return whether what was clipped is more than rounding away from some values."""
+    with np.errstate(invalid="ignore"):  # infinite samples stay as they are
+        moved = np.abs(clipped.values - values)
+    return bool(np.nanmax(moved, initial=0.0) > _SETTLED * clipped.scale)
 
 
 def _root(data: Data, place: tuple[int, ...], found: Identification) -> npt.NDArray[np.float64]:
