@@ -19,6 +19,7 @@ pub(crate) mod signs;
 pub(crate) mod slow_curve;
 pub(crate) mod slow_equations;
 pub(crate) mod slow_points;
+pub(crate) mod slow_predictions;
 pub(crate) mod slow_triangles;
 pub(crate) mod slowly_varying;
 pub(crate) mod trend;

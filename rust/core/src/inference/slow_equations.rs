@@ -12,8 +12,6 @@ use crate::regression::constants::{Expected, pool};
 use crate::regression::fit::Fit;
 use crate::regression::problem::Problem;
 use crate::regression::solved::{Solved, is_determined};
-use crate::regression::subsample::rows_all_over;
-use crate::regression::window_length::Scale;
 use crate::simd::instructions::Instructions;
 
 /// Coefficients of the polynomials in time.
@@ -181,124 +179,12 @@ fn fill(values: &[Option<f64>]) -> Option<Vec<f64>> {
     (0..values.len()).map(|place| values[place].or_else(|| nearest(place))).collect()
 }
 
-/// Squared errors over the noise variance are clipped to this, so that single rows do not dominate.
-const MOST: f64 = 25.0;
-
-/// How well slow coefficients predict rows.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Prediction {
-    /// Mean squared error over the noise's variance.
-    pub(crate) error: f64,
-    /// By how much of its variance the noise of a row is more than expected, with the coefficients that were found.
-    pub(crate) excess: f64,
-}
-
-impl Slow<'_> {
-    /// Mean squared error of predicting rows, over the noise's variance: slow coefficients from equations without the row, windowed ones from windows
-    /// on both sides of it. The angle's noise in a row grows with the coefficients: each square counts as if that were the expected noise, or
-    /// the smallest coefficients would predict best. More than twice that noise excuses no error. Of many rows some are predicted.
-    pub(crate) fn error(
-        &self,
-        problem: &Problem<'_>,
-        leave_gap_out: &Varying,
-        full: &Varying,
-        scale: Scale,
-        expected: Expected,
-    ) -> Prediction {
-        let nothing = Prediction { error: f64::INFINITY, excess: 0.0 };
-        let Some(solved) = &self.fit.leave_gap_out else { return nothing };
-        let is_noisy = !problem.noise.is_zero();
-        let usual = expected.variance - expected.torque;
-        let levels: Vec<f64> =
-            (0..self.coefficients).map(|one| self.current.map_or(0.0, |current| current.mean(one))).collect();
-        let (mut sum, mut excess, mut count) = (0.0, 0.0, 0.0);
-        let mut factors = Vec::new();
-        let mut constants = [leave_gap_out, full].map(|curve| {
-            let mut constants = vec![0.0; problem.layout.constant];
-            constants[self.coefficients..].copy_from_slice(&curve.constants);
-            constants
-        });
-        for row in rows_all_over(self.rows).filter(|&row| problem.usable[row]) {
-            let cell = scale.cell(row);
-            let Some(place) = solved.place(cell).filter(|&place| is_determined(solved, place)) else { continue };
-            let mut error = problem.rhs[row];
-            let taken = |one: usize| self.current.map_or((0.0, 0.0), |current| current.at(one, row as f64));
-            for (one, companion) in self.companions.iter().enumerate() {
-                let ((value, rate), (of_all, slope)) = (taken(one), full.at(one, row as f64));
-                constants[0][one] = leave_gap_out.at(one, row as f64).0 - value;
-                constants[1][one] = of_all - value;
-                error -= (slope - rate) / problem.period * companion[row];
-            }
-            for (constant, column) in constants[0].iter().zip(&problem.constants) {
-                error -= constant * column[row];
-            }
-            let later = (row as f64 - scale.centres(cell)[1]) * problem.period;
-            let beside = AtRow { solved, place, row, later };
-            error -= beside.predicted(problem, &constants[0]);
-            let mut square = error * error;
-            if is_noisy {
-                let more = constants.each_ref().map(|constants| {
-                    beside.factors(problem, constants, &mut factors);
-                    let slow = (0..self.coefficients).map(|one| constants[one] + taken(one).0 - levels[one]);
-                    factors.extend(slow.chain(constants[self.coefficients..].iter().copied()));
-                    factors.push(-1.0);
-                    (problem.noise.variance(&factors) - usual).min(usual)
-                });
-                square -= more[0];
-                excess += more[1] / expected.variance;
-            }
-            sum += (square / expected.variance).min(MOST);
-            count += 1.0;
-        }
-        if count > 0.0 { Prediction { error: sum / count, excess: excess / count } } else { nothing }
-    }
-}
-
-/// The windows on both sides of a row, which lies so many seconds after their middle.
-struct AtRow<'a> {
-    solved: &'a Solved,
-    place: usize,
-    row: usize,
-    later: f64,
-}
-
-impl AtRow<'_> {
-    /// A windowed coefficient at the middle, or its growth.
-    fn local(&self, unknown: usize, constants: &[f64]) -> f64 {
-        crate::regression::solved::local(self.solved, self.place, constants, unknown)
-    }
-
-    /// What windowed coefficients make of the row.
-    fn predicted(&self, problem: &Problem<'_>, constants: &[f64]) -> f64 {
-        let &Self { row, later, .. } = self;
-        let of = |unknown: usize| {
-            self.local(unknown, constants)
-                * match unknown.checked_sub(problem.layout.windowed) {
-                    None => problem.windowed[unknown][row],
-                    Some(slope) => problem.companions[slope][row] + later * problem.windowed[slope][row],
-                }
-        };
-        (0..problem.layout.local()).map(of).sum()
-    }
-
-    /// By which windowed regressors and their companions count in it.
-    fn factors(&self, problem: &Problem<'_>, constants: &[f64], factors: &mut Vec<f64>) {
-        let windowed = problem.layout.windowed;
-        factors.clear();
-        factors.extend((0..windowed).map(|one| self.local(one, constants)));
-        for one in 0..windowed {
-            let slope = if problem.layout.linear { self.local(windowed + one, constants) } else { 0.0 };
-            factors[one] += self.later * slope;
-            factors.push(slope);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::equation::rows::Rows;
     use crate::regression::simulated::{CONSTANTS, model, rows, staged, white};
+    use crate::regression::window_length::Scale;
 
     const ROWS: usize = 900;
 

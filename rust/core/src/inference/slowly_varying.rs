@@ -15,7 +15,8 @@ use crate::inference::bandwidths::{outward, within};
 use crate::inference::constancy::BLOCKS;
 use crate::inference::cross_validation::{ComparedRows, best_length, is_inside, near, rule_out};
 use crate::inference::slow_curve::Varying;
-use crate::inference::slow_equations::{Prediction, QUADRATIC, Slow};
+use crate::inference::slow_equations::{QUADRATIC, Slow};
+use crate::inference::slow_predictions::{PredictedRows, Prediction};
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
@@ -141,6 +142,7 @@ impl SlowSearch<'_> {
     ) -> Result<Option<BestCurve>, Error> {
         let &Self { expected, simpler, instructions, .. } = self;
         let triangles = equations.equations(problem);
+        let rows = PredictedRows::new(equations, problem, scale);
         let mut best: Option<BestCurve> = None;
         let mut least = f64::INFINITY;
         let mut consider = |terms: usize, reach: f64| -> Result<bool, Error> {
@@ -149,7 +151,7 @@ impl SlowSearch<'_> {
             }
             let fitted = equations.fit(&triangles, terms, (reach, hole(scale)), instructions, stages)?;
             let Some(curves) = fitted else { return Ok(false) };
-            let Prediction { error, excess } = equations.error(problem, &curves[0], &curves[1], scale, expected);
+            let Prediction { error, excess } = rows.error(&curves[0], &curves[1], expected);
             let counts = if terms == 1 { simpler * error } else { error };
             let is_better = best.is_none() || counts < least;
             if is_better {
