@@ -184,3 +184,35 @@ def test_samples_at_rest_whose_stamps_have_few_digits_are_kept(rate: float, *, i
     rows = [row for stamp, value in zip(stamps, values, strict=True) for row in clock.rows((stamp, value, 0.0))]
     assert np.array_equal([row[1] for row in [*rows, *clock.rest()]], values)
     assert (clock.twice, clock.lost, clock.repeated) == (0, 0, 0)
+
+
+@pytest.mark.parametrize("is_alike", [False, True])
+@pytest.mark.parametrize(
+    ("rate", "block", "late"), [(1000.0, 20, 1e-3), (1000.0, 50, 5e-3), (200.0, 32, 2e-3), (5000.0, 100, 1e-3)]
+)
+def test_buffers_that_a_driver_sends_late_lose_nothing(rate: float, block: int, late: float, *, is_alike: bool) -> None:
+    """Chunks of 20 at 1 kHz that came 1 ms late or less lost 22 of 1000 samples, and stiffness was 14.87 where it is 15."""
+    generator = np.random.default_rng(3)
+    count = int(8 * rate)
+    first = np.arange(count) // block * block
+    sent = (first + block) / rate + generator.exponential(late, count)[first]
+    back = -1e-6 if is_alike else 1 / rate
+    stamps = sent - (first + block - 1 - np.arange(count)) * back
+    clock, numbers = clocked(stamps.tolist(), 1 / rate)
+    assert clock.lost + clock.repeated <= 3
+    assert (clock.jumps, clock.twice) == (0, 0)
+    there = np.array(numbers)[~np.isnan(numbers)]
+    assert np.array_equal(there, np.arange(count))
+    assert clock.rate.period == pytest.approx(1 / rate, rel=2e-3)
+    # What is lost between buffers is found, to the part of a period that all of them are late.
+    some = np.r_[: count // 2, count // 2 + 400 : count]
+    clock, numbers = clocked(stamps[some].tolist(), 1 / rate)
+    assert clock.lost - clock.repeated == pytest.approx(400, abs=2 + 3 * late * rate)
+    assert np.abs(np.flatnonzero(np.isnan(numbers)) - count // 2).min() <= 2 * block
+
+
+def test_a_first_buffer_that_was_late_is_no_repetition() -> None:
+    stamps = np.arange(4000) * 1e-3
+    stamps[:20] += 5e-3 - 1e-6
+    clock, numbers = clocked(stamps.tolist())
+    assert (clock.lost, clock.repeated, len(numbers)) == (0, 0, 4000)

@@ -325,6 +325,48 @@ def test_streams_of_one_name_and_channels_of_one_label_are_refused() -> None:
     del second
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("labels", [["angle", "torque"], ["torque", "angle"]])
+def test_an_outlet_that_begins_again_keeps_its_channels_or_is_refused(labels: list[str]) -> None:
+    """The layer goes on with whatever has the same source: angle and torque were exchanged without a word."""
+    pylsl = pytest.importorskip("pylsl")
+    name = f"tvident-again-{os.getpid()}-{labels[0]}"
+
+    def outlet(names: list[str]) -> Any:
+        info = pylsl.StreamInfo(name, "Rig", 2, 1000.0, pylsl.cf_double64, f"{name}-source")
+        info.set_channel_labels(names)
+        return pylsl.StreamOutlet(info)
+
+    def come(found: Any, inlet: Any, count: int) -> list[list[float]]:
+        while not found.have_consumers():
+            time.sleep(0.01)
+        for number in range(count):
+            found.push_sample([1.0, 2.0], 100.0 + number / 1000)
+        came: list[list[float]] = []
+        until = time.monotonic() + 20
+        while len(came) < count and time.monotonic() < until:
+            came += next(inlet)
+        return came
+
+    first = outlet(["angle", "torque"])
+    inlet = Inlet(name, ["angle", "torque"])
+    pieces = inlet.pieces(0.05)
+    come(first, pieces, 30)
+    # The clocks of both are compared some time after the first sample; a loss before that is none of a clock.
+    time.sleep(1.0)
+    del first
+    second = outlet(labels)
+    if labels == ["angle", "torque"]:
+        came = come(second, pieces, 30)
+        assert inlet.restarts == 1
+        assert sum(math.isnan(row[1]) for row in came) == 1
+    else:
+        with pytest.raises(
+            ValueError, match="an outlet that begins again must have the channels, units and rate of before"
+        ):
+            come(second, pieces, 30)
+
+
 def test_silence_and_a_stream_that_is_its_own_input_are_said() -> None:
     command = [sys.executable, "-m", "tvident", "live", "--angle", "0", "--torque", "1", "--sample-rate", "1000"]
     with subprocess.Popen(

@@ -105,10 +105,10 @@ def live(
         outlet.close()
     for words in session.words():
         click.echo(words, err=True)
-    _say_read(source)
+    _say_read(source, session.clock.empty)
 
 
-def _say_read(source: Inlet | Lines) -> None:
+def _say_read(source: Inlet | Lines, empty: int) -> None:
     """Say which samples could not be read; end with an error where that is all of them, or none came."""
     has_lines = isinstance(source, Lines)
     if source.unreadable:
@@ -117,6 +117,10 @@ def _say_read(source: Inlet | Lines) -> None:
             f"{source.first_unreadable}",
             err=True,
         )
+    if source.restarts:
+        click.echo(f"the outlet began again {source.restarts} times: no window goes over that", err=True)
+    if (missing := empty - source.unreadable - source.restarts) > 0:
+        click.echo(f"{missing} samples came without an angle or a torque and count as missing", err=True)
     if not source.read and has_lines:
         raise click.ClickException(
             "lines must hold the channels; got none that does; look at what is piped, and at --angle and --torque"

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import dataclass, field
 
 Row = tuple[float, float, float]
 """Time, angle, torque."""
 
 _WAIT = 16
-"""Samples that decide whether a stamp was late or early alone, or samples were lost or repeated before it."""
+"""Samples that decide whether a stamp was late or early alone, or samples were lost or repeated before it; buffers, where samples come
+in buffers whose stamps are late or early together."""
+
+_LONGEST_WAIT, _LONGEST_BUFFER = 2.0, 0.5
+"""Seconds that samples wait for buffers that decide, at most, and that a buffer lasts, at most."""
+
+_UNEVEN = 2e-3
+"""Of a step from stamp to stamp, by how much it is no whole number of periods where another buffer begins."""
 
 _HALF = 0.5
 """Periods: a stamp that is later belongs to the next sample."""
@@ -21,7 +29,10 @@ _COARSE = 1.005
 """Periods from stamp to stamp, at least, where their last digit is longer than a period."""
 
 _FOLLOW = 0.05
-"""Part of a stamp's lateness by which the next one is expected later: the clock is followed over some 20 samples."""
+"""Part of a stamp's lateness by which the next one is expected later: the clock is followed over some 20 samples, or buffers."""
+
+_SET_BACK = 0.1
+"""Seconds by which a stamp is before the last one, at least, where the clock was set."""
 
 _KNOWN, _NO_MISTAKE = 1e-3, 0.1
 """Relative error of a period that is known well, and how far it may be from the nominal one without being a mistake."""
@@ -71,13 +82,51 @@ class Rate:
         return math.sqrt(left / (self.count - 2) / self.squares)
 
 
+@dataclass
+class Buffers:
+    """Samples that come together.
+
+    Drivers and the Lab Streaming Layer give them one stamp, or even stamps that are all as late as the one that the buffer got.
+
+    Parameters
+    ----------
+    longest : int
+        Samples of a buffer, at most.
+    """
+
+    longest: int
+    _run: int = 0
+    _is_alike: bool = False
+    _lengths: deque[int] = field(default_factory=lambda: deque([1, 1, 1], maxlen=3))
+
+    def see(self, step: float) -> bool:
+        """Take a step from stamp to stamp, in periods, and return whether the later stamp tells anything that the earlier did not."""
+        if not math.isfinite(step):
+            return True
+        was_alike, self._is_alike = self._is_alike, -_MOVES < step < _MOVES
+        if self._is_alike:
+            self._run += 1
+            return False
+        if was_alike or step < _HALF or abs(step - round(step)) > _UNEVEN * max(1.0, step):
+            self._lengths.append(self._run if self._run <= self.longest else 1)
+            self._run = 0
+        self._run += 1
+        return True
+
+    @property
+    def length(self) -> int:
+        """Samples of the latest buffers; 1 where stamps do not show any."""
+        return max(self._lengths) if self._run <= self.longest else 1
+
+
 class LiveClock:
     """Puts samples in order by their stamps, and what was lost between them as NaN.
 
     A stamp that is late alone, since a driver held it back, is followed by ones that are not; after a loss all are late, and after
     samples that came twice all are early. So a stamp that is off waits for the next 16, and whole periods that all of them are late are
-    lost samples. With a counter nothing has to wait. Where samples came twice or the clock was set, one NaN keeps windows apart; a
-    sample that comes twice with its stamp is left out, unless stamps say that both are of one buffer, or have too few digits to say it.
+    lost samples. Samples of a buffer are late together: there 16 buffers decide, in two seconds at most. With a counter nothing has to
+    wait. Where samples came twice or the clock was set, one NaN keeps windows apart; a sample that comes twice with its stamp is left
+    out, unless stamps say that both are of one buffer, or have too few digits to say it.
 
     Parameters
     ----------
@@ -88,14 +137,19 @@ class LiveClock:
     ----------
     rate : Rate
         Since the clock was set.
-    lost, repeated, jumps, back, twice : int
+    lost, repeated, jumps, back, twice, empty : int
         Samples that did not come and that came twice or too late, how often clock or counter were set, stamps that are before the last
-        one by half a period or more, and samples that were left out since they came twice with their stamps.
+        one by half a period or more, samples that were left out since they came twice with their stamps, and that came without a number.
     """
 
     def __init__(self, period: float) -> None:
         self._period = period
         self._waiting: list[Row] = []
+        self._told: list[bool] = []
+        """Of samples that wait, whether their stamps tell anything that the stamp before them did not."""
+        self._earliest, self._latest_off = math.inf, -math.inf
+        """Periods by which those that wait are late: of the one that is least late, and most."""
+        self._buffers = Buffers(max(1, int(_LONGEST_BUFFER / period)))
         self._next = 0
         self._expected = self._last = math.nan
         self._counter: int | None = None
@@ -110,7 +164,7 @@ class LiveClock:
         """Seconds from one stamp to another."""
         self._alike: list[Row] = []
         """Samples that are like the one before them, stamp and values, until the next stamp says what they are."""
-        self.lost = self.repeated = self.jumps = self.back = self.twice = 0
+        self.lost = self.repeated = self.jumps = self.back = self.twice = self.empty = 0
 
     def rows(self, row: Row, counter: float | None = None) -> list[Row]:
         """Take a sample, and return those that are in order now."""
@@ -150,16 +204,17 @@ class LiveClock:
         step = (row[0] - self._last) / self._seconds()
         if math.isfinite(row[0]):
             self._last = row[0]
-        self.back += step <= -_HALF
-        off = self._off(row, len(self._waiting))
-        if step < -_WAIT:
+        tells = self._buffers.see(step)
+        length = self._buffers.length
+        self.back += step <= -_HALF and length == 1
+        if step < -max(_WAIT, 2 * length, _SET_BACK / self._period):
             # Nothing before it says when this one is due.
             return [*self._settled_at_last(), *self._jumped(row[0]), self._taken(row)]
-        is_due = not abs(off) >= _HALF or -_MOVES < step < _MOVES
-        if not self._waiting and is_due:
-            return [self._taken(row)]
-        self._waiting.append(row)
-        return self._settled() if len(self._waiting) > _WAIT or abs(off) < _HALF else []
+        if not self._waiting and not (tells and abs(self._off(row, 0)) >= _HALF):
+            return [self._taken(row, tells=tells)]
+        self._wait(row, tells=tells)
+        wait = max(_WAIT, min(_WAIT * length, int(_LONGEST_WAIT / self._period)))
+        return self._settled() if len(self._waiting) > wait or self._is_due() else []
 
     def rest(self) -> list[Row]:
         """Return what still waits, at the end: samples of one buffer say nothing of what was lost."""
@@ -170,9 +225,9 @@ class LiveClock:
         """Return what waits for stamps that do not come any more."""
         found: list[Row] = []
         while self._waiting:
-            if self._waiting[-1][0] - self._waiting[0][0] < _MOVES * self._seconds():
-                found += map(self._taken, self._waiting)
-                self._waiting.clear()
+            is_one_buffer = self._waiting[-1][0] - self._waiting[0][0] < _MOVES * self._seconds()
+            if is_one_buffer or 1 < len(self._waiting) <= 2 * self._buffers.length:
+                found += self._taken_first(len(self._waiting))
             else:
                 found += self._settled()
         return found
@@ -199,19 +254,51 @@ class LiveClock:
         """Return by how many periods a stamp comes late, with so many samples before it that wait; less than zero where it is early."""
         return (row[0] - self._expected) / self._seconds() - place
 
+    @property
+    def _rate_error(self) -> float:
+        """Standard error of the period: samples of a buffer are late together."""
+        return self.rate.error * math.sqrt(self._buffers.length)
+
     def _seconds(self) -> float:
         """Return the period by which stamps are judged: what they show once they show it well."""
-        shown, error = self.rate.period, self.rate.error
+        shown, error = self.rate.period, self._rate_error
         is_known = error < _KNOWN * self._period and abs(shown - self._period) < _NO_MISTAKE * self._period
         return shown if is_known else self._period
 
+    def _offs(self) -> list[float]:
+        """Return by how many periods each sample that waits is late, NaN where its stamp tells nothing."""
+        both = enumerate(zip(self._waiting, self._told, strict=True))
+        return [self._off(row, place) if tells else math.nan for place, (row, tells) in both]
+
+    def _wait(self, row: Row, *, tells: bool) -> None:
+        """Let a sample wait."""
+        self._see_off(self._off(row, len(self._waiting)) if tells else math.nan)
+        self._waiting.append(row)
+        self._told.append(tells)
+
+    def _see_off(self, off: float) -> None:
+        """Note how late the earliest and the latest of those that wait are."""
+        if math.isfinite(off):
+            self._earliest, self._latest_off = min(self._earliest, off), max(self._latest_off, off)
+
+    def _is_due(self) -> bool:
+        """Return whether nothing was lost or repeated before those that wait: one of them is not off, or some are late and some early."""
+        return self._earliest < _HALF and self._latest_off > -_HALF
+
     def _settled(self) -> list[Row]:
-        """Return what waits up to the sample that is off least, after what was lost before them."""
-        off = [self._off(row, place) for place, row in enumerate(self._waiting)]
-        least = min(range(len(off)), key=lambda place: abs(off[place]) if math.isfinite(off[place]) else math.inf)
-        by = math.floor(off[least] + _HALF) if math.isfinite(off[least]) else 0
+        """Return what waits up to the last sample that is not off, or all of it, after what was lost before it."""
+        off = (
+            0.0
+            if self._is_due() or not math.isfinite(self._earliest)
+            else min(self._earliest, self._latest_off, key=abs)
+        )
+        by = math.floor(off + _HALF)
         if by > _MOST_LOST:
             found = self._jumped(self._waiting[0][0])
+        elif by < 0 and self._came <= 2 * self._buffers.length:
+            # The first buffer was late, and said when the others are due.
+            self._expected += by * self._seconds()
+            found = []
         elif by < 0:
             self.repeated -= by
             self._next += by
@@ -219,8 +306,17 @@ class LiveClock:
             found = [_apart(self._waiting[0][0])]
         else:
             found = self._gap(by)
-        found += [self._taken(row) for row in self._waiting[: least + 1]]
-        del self._waiting[: least + 1]
+        due = [place for place, off in enumerate(self._offs()) if abs(off) < _HALF]
+        return [*found, *self._taken_first(due[-1] + 1 if due else len(self._waiting))]
+
+    def _taken_first(self, count: int) -> list[Row]:
+        """Take so many of those that wait."""
+        both = zip(self._waiting[:count], self._told[:count], strict=True)
+        found = [self._taken(row, tells=tells) for row, tells in both]
+        del self._waiting[:count], self._told[:count]
+        self._earliest, self._latest_off = math.inf, -math.inf
+        for off in self._offs():
+            self._see_off(off)
         return found
 
     def _jumped(self, stamp: float) -> list[Row]:
@@ -239,15 +335,16 @@ class LiveClock:
         self._expected += missing * self._seconds()
         return found
 
-    def _taken(self, row: Row) -> Row:
-        """Note a sample and its stamp, and follow the clock with it."""
+    def _taken(self, row: Row, *, tells: bool = True) -> Row:
+        """Note a sample and its stamp, and follow the clock with it if it tells anything."""
         self._came += 1
+        self.empty += not (math.isfinite(row[1]) and math.isfinite(row[2]))
         if math.isfinite(row[0]):
             self.rate.see(self._next, row[0])
             if math.isnan(self._expected):
                 self._expected = row[0]
-            late = max(-_HALF, min(_HALF, self._off(row, 0)))
-            self._expected += _FOLLOW * late * self._seconds()
+            late = max(-_HALF, min(_HALF, self._off(row, 0))) if tells else 0.0
+            self._expected += _FOLLOW / self._buffers.length * late * self._seconds()
         self._next += 1
         self._expected += self._seconds()
         return row
@@ -271,7 +368,7 @@ class LiveClock:
 
     def words(self) -> list[str]:
         """Return what there is to say of the clock."""
-        nominal, period, error = 1 / self._period, self.rate.period, self.rate.error
+        nominal, period, error = 1 / self._period, self.rate.period, self._rate_error
         if not (math.isfinite(period) and period > 0 and math.isfinite(error)):
             said = [f"rate: {nominal:.6g} Hz nominal; no stamps to compare it with"]
         elif self.comes_faster:

@@ -48,7 +48,7 @@ class Lines:
         self._is_begun = self._has_ended = False
         self.units = [""] * len(self._names)
         """Of the channels, as a header, a line below it or keys say them."""
-        self.read = self.unreadable = 0
+        self.read = self.unreadable = self.restarts = 0
         self.first_unreadable = ""
         """The line, and the key that it has not."""
 

@@ -51,6 +51,8 @@ class Inlet:
         Samples with numbers, and those of a stream of text without, which are missing.
     first_unreadable : str
         One of them.
+    restarts : int
+        How often an outlet of the same source began again, where one missing sample keeps windows apart.
     """
 
     def __init__(self, name: str, names: Sequence[str], timeout: float = 10.0) -> None:
@@ -73,7 +75,7 @@ class Inlet:
         # Stamps are brought to this machine's clock; smoothing them would hide what was lost.
         self._inlet = pylsl.StreamInlet(found[0], max_buflen=_BUFFERED, processing_flags=pylsl.proc_clocksync)
         self._lost = pylsl.util.LostError
-        self.read = self.unreadable = 0
+        self.read = self.unreadable = self.restarts = 0
         self.first_unreadable = ""
         try:
             info = self._inlet.info(timeout=timeout)
@@ -83,6 +85,7 @@ class Inlet:
             ) from None
         self.nominal_rate: float = info.nominal_srate()
         self._places = _places(info, names)
+        self._source, self._said = found[0].source_id(), _said(info)
         of_channels = [_unit(one) for one in info.get_channel_units() or ()]
         self.units = [of_channels[place] if place < len(of_channels) else "" for place in self._places]
         """Of the channels, as the stream says them."""
@@ -95,7 +98,28 @@ class Inlet:
                 samples, stamps = self._inlet.pull_chunk(timeout=wait, max_samples=_MOST, min_samples=1)
             except self._lost:
                 return
-            yield [[stamp, *self._numbers(sample)] for sample, stamp in zip(samples, stamps, strict=True)]
+            rows = [[stamp, *self._numbers(sample)] for sample, stamp in zip(samples, stamps, strict=True)]
+            if self._inlet.was_clock_reset():
+                self._check_same()
+                self.restarts += 1
+                rows.insert(0, [math.nan] * (1 + len(self._places)))
+            yield rows
+
+    def _check_same(self) -> None:
+        """Refuse an outlet that began again with other channels: the layer goes on with whatever has the same source."""
+        pylsl = _library()
+        for found in (
+            pylsl.resolve_byprop("source_id", self._source, minimum=1, timeout=_SECOND) if self._source else []
+        ):
+            try:
+                said = _said(pylsl.StreamInlet(found, recover=False).info(timeout=_SECOND))
+            except (self._lost, pylsl.util.TimeoutError):
+                continue
+            if said != self._said:
+                raise ValueError(
+                    f"an outlet that begins again must have the channels, units and rate of before: {self._said}; got {said}; "
+                    "start this command again"
+                )
 
     def _numbers(self, sample: Sequence[Any]) -> list[float]:
         """Return the numbers of the channels; a stream may hold text."""
@@ -107,6 +131,12 @@ class Inlet:
             return [math.nan] * len(self._places)
         self.read += 1
         return numbers
+
+
+def _said(info: Any) -> str:
+    """Return what a stream says of its channels."""
+    labels, units = info.get_channel_labels() or (), info.get_channel_units() or ()
+    return f"labels {list(map(str, labels))}, units {list(map(str, units))}, {info.channel_count()} channels, {info.nominal_srate():g} Hz"
 
 
 def _unit(said: Any) -> str:
