@@ -88,12 +88,14 @@ def test_known_parameters_are_not_drawn_and_terms_are() -> None:
     assert titles(result.plot()) == ["Inertia $I$", "Stiffness $K$", "Offset"]
 
 
-def test_a_batch_cannot_be_drawn(rig: tvident.Recording) -> None:
+def test_over_time_alone_a_batch_can_be_drawn(rig: tvident.Recording) -> None:
     angle, torque = np.tile(rig.angle, (2, 1)), np.tile(rig.torque, (2, 1))
     result = tvident.identify(angle, torque, sample_rate=1000, method="paper")
-    for what in ("parameters", "torque", "status", "poles"):
+    for what in ("torque", "status", "poles"):
         with pytest.raises(ValueError, match="only a single record"):
             result.plot(what)
+    with pytest.raises(ValueError, match="only a single record"):
+        figures.plot_identification(result)
 
 
 def test_constants_are_a_line_of_text_and_what_changes_has_a_panel_and_its_error(
@@ -342,3 +344,23 @@ def test_what_is_masked_is_not_in_the_window() -> None:
     assert tops[0] == tops[1]
     beside = figures.plot_window(spoilt, 100, 31).axes[0].get_ylim()
     assert beside[1] < 2
+
+
+def test_several_records_are_drawn_together() -> None:
+    rigs = [tvident.simulate_torsional_rig(duration=seconds, seed=seed) for seed, seconds in enumerate((1.5, 2.0))]
+    angles, torques = [np.asarray(rig.angle) for rig in rigs], [np.asarray(rig.torque) for rig in rigs]
+    found = tvident.identify([*angles, angles[0][:9]], [*torques, torques[0][:9]], sample_rate=1000, share=("inertia",))
+    figure = found.plot()
+    assert titles(figure) == ["Stiffness $K$", "Inertia $I$", "Damping $C$", "Offset"]
+    moving, inertia = figure.axes[:2]
+    assert [line.get_label() for line in moving.get_lines()] == ["record 0", "record 1", "record 2"]
+    assert np.asarray(inertia.get_lines()[-1].get_ydata())[0] == found.constants["inertia"][0]
+    assert inertia.get_xlabel() == "record"
+    batch = tvident.identify(
+        np.stack([one[:1500] for one in angles]), np.stack([one[:1500] for one in torques]), sample_rate=1000
+    )
+    assert "Stiffness $K$" in titles(batch.plot())
+    with pytest.raises(ValueError, match=r"draw one of them: result\[0\].plot\('poles'\)"):
+        found.plot("poles")
+    with pytest.raises(ValueError, match=r"1 to 24 records; got 25; draw some: result\[:24\]"):
+        figures.plot_records([batch[0]] * 25)

@@ -273,9 +273,9 @@ def test_records_of_a_list_are_one_table() -> None:
     assert np.array_equal(table["stiffness"].to_numpy(), np.concatenate([one.stiffness for one in found]))
     records: Any = found
     with pytest.raises(
-        AttributeError, match=r"plot must be asked of one record; got a list of 3; write result\[0\]\.plot"
+        AttributeError, match=r"scan must be asked of one record; got a list of 3; write result\[0\]\.scan"
     ):
-        records.plot()
+        records.scan()
     with pytest.raises(AttributeError, match="has no attribute 'foo'"):
         _ = records.foo
     assert found[3:].to_pandas().empty

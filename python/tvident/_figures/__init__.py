@@ -14,6 +14,7 @@ from tvident._figures.paper import paper_figure_2, paper_figure_4, paper_figure_
 from tvident._figures.parameters import plot_identification, plot_over_position
 from tvident._figures.poles import plot_poles
 from tvident._figures.recording import plot_recording
+from tvident._figures.records import plot_records
 from tvident._figures.scan import plot_scan
 from tvident._figures.status import plot_status
 from tvident._figures.torque import plot_torque
@@ -31,6 +32,7 @@ __all__ = [
     "plot_over_position",
     "plot_poles",
     "plot_recording",
+    "plot_records",
     "plot_scan",
     "plot_status",
     "plot_torque",

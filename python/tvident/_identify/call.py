@@ -117,10 +117,10 @@ def identify(
     ----------
     angle : array_like, shape (\*, n), or list of them, or None
         Angle in rad; a list of records of different lengths gives a result for each, the same as calls one by one, and then `mask`, `t`,
-        `sample_rate` and whatever has a value for every sample may be lists too; None where `velocity` or `acceleration` was measured in
-        its place. Time is the last axis; any others are a batch of records. Masked samples are missing, as NaN is. Tables of pandas and
-        polars have time along their rows, arrays of xarray along ``time``; their labels come back with ``to_pandas()``, ``to_polars()`` and
-        ``to_xarray()`` of the result. A column, shape (n, 1), is one record.
+        `sample_rate` and whatever has a value for every sample may be lists too; a record that is too short has NaN alone. None where
+        `velocity` or `acceleration` was measured in its place. Time is the last axis; any others are a batch of records. Masked samples are
+        missing, as NaN is. Tables of pandas and polars have time along their rows, arrays of xarray along ``time``; their labels come back
+        with ``to_pandas()``, ``to_polars()`` and ``to_xarray()`` of the result. A column, shape (n, 1), is one record.
     torque : array_like, same shape
         Torque in N m.
     sample_rate : float or (float, float)

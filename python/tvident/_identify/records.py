@@ -11,6 +11,7 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident._equation import COEFFICIENTS, Term
 from tvident._identify.earlier import with_earlier_kinds
+from tvident._identify.short_records import without_numbers
 from tvident._results import Identification, IdentifiedRecords, Shared, covariance_between, with_shared
 from tvident._status import Status
 
@@ -125,6 +126,11 @@ def identify_records(
                 except (ValueError, TypeError) as error:
                     if report is not None and report.error is error:
                         raise
+                    short = None if not isinstance(error, ValueError) else without_numbers(single, calls, place, error)
+                    if short is not None:
+                        found.append(short)
+                        before += sizes[place]
+                        continue
                     if place == 0 and _is_of_all(str(error), calls):
                         raise
                     kind = ValueError if isinstance(error, ValueError) else TypeError

@@ -10,7 +10,7 @@ from tvident._results.measured import Measured, known_name, number_of
 from tvident._results.medians import median_of
 from tvident._results.parts import chosen, of_records, samples_between, settings_of
 from tvident._results.recorded import Recorded, begins_once, both_or_none, mark_of, still_there
-from tvident._results.records import IdentifiedRecords, Shared, covariance_between, with_shared
+from tvident._results.records import IdentifiedRecords, Shared, covariance_between, of_short, with_shared
 from tvident._results.response import Model, accounted_for, every_sample, without_gaps
 from tvident._results.result import Identification
 from tvident._results.scan import Scan, scan_of
@@ -83,6 +83,7 @@ __all__ = [
     "of_batch",
     "of_powers",
     "of_records",
+    "of_short",
     "part_trusted",
     "parts_of",
     "plain_curves",

@@ -5,17 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._files import printable
+from tvident._results.held_back import HeldBack
+from tvident._results.parts import of_samples
 from tvident._results.result import Identification
 from tvident._results.stored_lists import store_list
+from tvident._results.words import Words
 from tvident._status import Status
 from tvident._tables import TabularList
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -129,6 +136,30 @@ def with_shared(result: Identification, shared: Shared, changes: Mapping[str, Id
         settings=result.settings,
         recorded=result._recorded,  # noqa: SLF001 - of this room
     )
+
+
+def of_short(result: Identification, time: Array, why: str) -> Identification:
+    """Return a result without numbers for a record that is too short.
+
+    Parameters
+    ----------
+    result : Identification
+        Of a record in which every sample is missing, and which is long enough.
+    time : ndarray, shape (n,)
+        Of the samples of which results are wanted.
+    why : str
+    """
+    advice = f"nothing could be identified of this record: {why}"
+    part = Identification(
+        of_samples(result._found, slice(0, time.size)),  # noqa: SLF001 - of this room
+        time=time,
+        terms=list(result.terms),
+        jumps=(),
+        words=Words(advice=(advice,)),
+        settings=result.settings,
+    )
+    part._held_back = HeldBack(why_not="the record is too short")  # noqa: SLF001 - of this room
+    return part
 
 
 def _change(result: Identification, other: Identification, name: str, deviation: float) -> Array:
@@ -289,6 +320,44 @@ class IdentifiedRecords(TabularList, Sequence[Identification]):
 
         words = self.summary()
         report_list(self._records, path, shared=self.constants, advice=self.advice, summary=words, title=title)
+
+    def plot(self, what: str = "parameters", *, ax: Axes | Sequence[Axes] | None = None) -> Figure:
+        """Draw the parameters of all records, on axes of your own or in a new figure.
+
+        One line is a record where they change with time, one point with two standard errors where they are constant; what is shared is a
+        line with a band.
+
+        Parameters
+        ----------
+        what : str, optional
+            Always ``"parameters"``; other pictures are of one record.
+        ax : Axes or sequence of Axes, optional
+            Where to draw; one Axes is divided if there are several panels.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ImportError
+            If matplotlib is missing: install ``tvident[plot]``.
+        ValueError
+            If another picture is asked for, or there are more than 24 records: ``result[:24]`` are some.
+
+        See Also
+        --------
+        Identification.plot : pictures of one record.
+        report : a page to zoom in.
+        """
+        from tvident import _figures  # noqa: PLC0415 - matplotlib is optional
+
+        if what != "parameters":
+            raise ValueError(
+                f"what must be 'parameters' for a list of records; got {arguments.shown(what)}; draw one of them: "
+                f"result[0].plot({arguments.shown(what)})"
+            )
+        return _figures.plot_records(self._records, shared=self.constants, ax=ax)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or not self._records or not hasattr(self._records[0], name):

@@ -160,7 +160,8 @@ class Shown(Simulated, Telling, Valued):
             ``"parameters"``: time-varying ones with bands of two standard errors, and constants in one line (``truth=`` draws a simulated
             truth and the error). ``"torque"``: recorded, predicted and what is left. ``"status"``: order and flags over time.
             ``"poles"``: poles, natural frequency and damping ratio. ``"scan"``: estimates by the width of the test function, or of windows.
-            ``"over"``: a parameter over the channel ``position=`` (``name=``, ``label=``).
+            ``"over"``: a parameter over the channel ``position=`` (``name=``, ``label=``). Of several records there is the first: a line or
+            a point for each, of at most 24.
         ax : Axes or sequence of Axes, optional
             Where to draw; one Axes is divided where a picture has several panels.
         **options
@@ -175,7 +176,7 @@ class Shown(Simulated, Telling, Valued):
         ImportError
             If matplotlib is missing: install ``tvident[plot]``.
         ValueError
-            If there are several records, or no such picture.
+            If there is no such picture, or none of several records.
 
         See Also
         --------
@@ -189,6 +190,10 @@ class Shown(Simulated, Telling, Valued):
             raise TypeError(
                 "a parameter must be drawn over a channel; got none; give position=, with a value for every sample"
             )
+        if what == "parameters" and self.inertia.ndim > 1 and not options:
+            batch: Any = self
+            places = list(np.ndindex(self.inertia.shape[:-1]))
+            return _figures.plot_records([batch[place if len(place) > 1 else place[0]] for place in places], ax=ax)
         if what == "scan":
             return self.scan().plot(ax=ax, **options)
         draw: dict[str, Callable[..., Figure]] = {
