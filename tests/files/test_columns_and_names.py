@@ -5,9 +5,11 @@ from __future__ import annotations
 import warnings
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.io import savemat
 
 import tvident
 from tvident import recordings
@@ -212,3 +214,20 @@ def test_labels_in_an_odd_unit_are_told_with_their_cure(name: str, step: float, 
     index = pd.Index(step * (0.5 + np.arange(rig.angle.size)), name=name)
     with pytest.raises(TypeError, match=f"give t=angle.index and .*{cure}"):
         tvident.identify(pd.Series(rig.angle, index=index), rig.torque)
+
+
+@pytest.mark.parametrize("name", ["d.mat", "d.npz", "d.h5"])
+def test_what_is_empty_beside_channels_is_said(tmp_path: Path, name: str) -> None:
+    """A `torque = []` of MATLAB was gone without a word; among settings it is nothing."""
+    samples, path = np.arange(100.0), tmp_path / name
+    if name == "d.mat":
+        nothing = np.zeros((0, 0))
+        savemat(path, {"angle": samples, "torque": nothing, "settings": {"gain": nothing, "n": 3.0}})
+    elif name == "d.npz":
+        np.savez(path, angle=samples, torque=samples[:0])
+    else:
+        with h5py.File(path, "w") as file:
+            file["angle"], file["torque"] = samples, samples[:0]
+    with pytest.warns(recordings.FileWarning, match=r"without samples: 'torque'$"):
+        found = tvident.read_recording(path)
+    assert "torque" not in found

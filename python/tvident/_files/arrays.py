@@ -21,23 +21,32 @@ _LARGE, _RATIO = 1 << 28, 200
 def numeric(named: Iterable[tuple[str, Any]], say: Say) -> Channels:
     """Return what can be a channel or a number: real arrays, each column of a matrix on its own."""
     skipped: list[str] = []
-    channels = _numeric(named, skipped)
+    empty: list[str] = []
+    channels = _numeric(named, skipped, empty)
     if skipped:
         say(f"not read: {listed(skipped)}; channels are real, and vectors or columns of a matrix")
+    # What is empty beside channels was to be one; in structures of settings it is nothing.
+    recorded = {name.rpartition(".")[0] for name, values in channels.items() if values.size > 1}
+    without = [f"'{printable(name or '0', 60)}'" for name in empty if name.rpartition(".")[0] in recorded]
+    if without:
+        say(f"without samples: {listed(without)}")
     return channels
 
 
-def _numeric(named: Iterable[tuple[str, Any]], skipped: list[str]) -> Channels:
+def _numeric(named: Iterable[tuple[str, Any]], skipped: list[str], empty: list[str]) -> Channels:
     channels: Channels = {}
     for name, value in named:
         array = np.asarray(value)
         if array.dtype.names:
             fields = ((f"{name}.{field}" if name else field, array[field]) for field in array.dtype.names)
-            channels |= _numeric(fields, skipped)
+            channels |= _numeric(fields, skipped, empty)
             continue
         if array.dtype.kind == "c":
             skipped.append(f"{name or '0'} (complex)")
-        if array.dtype.kind not in "biuf" or array.size == 0:
+        if array.dtype.kind not in "biuf":
+            continue
+        if array.size == 0:
+            empty.append(name)
             continue
         if array.dtype.kind == "b":
             array = array.view(np.uint8) != 0  # in a file true may be any byte

@@ -42,7 +42,7 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
         skipped.append("what was cut off at the end of the file (channels may have different lengths)")
     channels = [(one, parts_of(every, one)) for group in file.groups() for one in group.channels()]
     read = [(one, parts, _samples(one, parts, told, skipped)) for one, parts in channels]
-    starts = [start for one, parts, samples in read if samples is not None for _, start in _starts(parts)]
+    starts = [start for _, parts, samples in read if samples is not None for _, start, _ in _begins(parts) if start]
     starts += [
         samples[0] for _, _, samples in read if samples is not None and samples.dtype.kind == "M" and samples.size
     ]
@@ -51,11 +51,18 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
         if samples is None:
             continue
         time, axis, unit, taken = None, TIME, _unit(channel.properties), samples
+        late = next((first for first, properties in parts if _unit(properties)), 0)
+        if late:
+            skipped.append(
+                Remark(
+                    f"channel {cut(channel.name)}: its unit, {cut(unit)}, was written at sample {late}, and is taken for all of it"
+                )
+            )
         if samples.dtype.kind == "M":
             unit = "s"
             taken = (samples - min(starts)) / np.timedelta64(1, "s") if samples.size else samples.astype(float)
         elif samples.size:
-            time, axis = _times(channel, samples.size, _starts(parts), starts, skipped)
+            time, axis = _times(channel, samples.size, _begins(parts), starts, skipped)
         part = Group(channel.group_name, time, [(channel.name, unit, taken)], axis)
         before = next(
             (one for one in groups if one.name == part.name and one.axis == axis and _same(one.time, time)), None
@@ -106,6 +113,9 @@ def _changed(parts: Parts) -> str:
         if other is not None:
             shown = f": {said[0]}, then {other}" if isinstance(other, str | float) else ""
             return f"it was appended to with another {what}{shown}"
+    units = [_unit(properties) for _, properties in parts]
+    if units[0] and not all(units):
+        return f"it was appended to without a unit, after {units[0]}"
     return ""
 
 
@@ -123,17 +133,22 @@ def _alike(value: Any, other: Any) -> bool:
         return False
 
 
-def _starts(parts: Parts) -> list[tuple[int, Any]]:
-    """Return the numbers of samples, and when they were taken, where the file says so: the first, and what was appended."""
-    found: list[tuple[int, Any]] = []
+def _begins(parts: Parts) -> list[tuple[int, Any, float]]:
+    """Return the first sample of every part whose beginning is another than that of the part before: its number, start and offset.
+
+    The start is None where the file does not say any.
+    """
+    found: list[tuple[int, Any, float]] = []
     for first, properties in parts:
-        if _has_start(properties) and (not found or properties["wf_start_time"] != found[-1][1]):
-            found.append((first, properties["wf_start_time"]))
+        start = properties["wf_start_time"] if _has_start(properties) else None
+        begin = (start, float(properties.get("wf_start_offset") or 0.0))
+        if not found or begin != found[-1][1:]:
+            found.append((first, *begin))
     return found
 
 
 def _times(
-    channel: Any, samples: int, begun: Sequence[tuple[int, Any]], starts: Sequence[Any], skipped: list[str]
+    channel: Any, samples: int, begun: Sequence[tuple[int, Any, float]], starts: Sequence[Any], skipped: list[str]
 ) -> tuple[Any, tuple[str, str]]:
     """Return the times of a channel, or what else its samples lie at, with name and unit; None where the file does not say."""
     import numpy as np  # noqa: PLC0415 - within the limits
@@ -149,15 +164,21 @@ def _times(
         )
         return None, TIME
     period = float(period)
-    time = float(properties.get("wf_start_offset", 0.0)) + period * np.arange(samples)
-    if axis[0] != TIME[0] or not begun:
+    time = begun[0][2] + period * np.arange(samples)
+    if axis[0] != TIME[0]:
         return time, axis
     second = 1 / factor_between(axis[1], "s", name="time")
-    later = [(first, second * float((start - min(starts)) / np.timedelta64(1, "s"))) for first, start in begun]
-    before, moved = later[0]
-    time += moved if moved > _SAME_START * period else 0.0
-    for first, start in later[1:]:
-        pause = start - moved - period * (first - before)
+
+    def moved_to(start: Any) -> float:
+        moved = 0.0 if start is None else second * float((start - min(starts)) / np.timedelta64(1, "s"))
+        return moved if moved > _SAME_START * period else 0.0
+
+    before, start, offset = begun[0]
+    moved = moved_to(start) + offset
+    time += moved - offset
+    for first, start, offset in begun[1:]:
+        begin = moved_to(start) + offset
+        pause = begin - moved - period * (first - before)
         if abs(pause) > _GOES_ON * period:
             time[first:] += pause
             skipped.append(
@@ -165,7 +186,7 @@ def _times(
                     f"channel {cut(channel.name)}: it was appended to {pause / second:.6g} s after its end, as its times say"
                 )
             )
-            before, moved = first, start
+            before, moved = first, begin
     return time, axis
 
 

@@ -1,0 +1,54 @@
+"""Parts that a TDMS file was appended in: when each began, and in which unit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from nptdms import ChannelObject, TdmsWriter
+
+import recorded_files as examples
+import tvident
+from tvident._formats.tdms import variables
+from tvident._formats.told import Remark
+
+T, ANGLE, TORQUE = examples.T, examples.ANGLE, examples.TORQUE
+
+START = np.datetime64("2024-01-01T10:00:00.5")
+
+
+def read(
+    path: Path, *segments: Sequence[tuple[str, Any, Mapping[str, Any]]]
+) -> tuple[Mapping[str, tvident.Channel], str, str]:
+    """Write a file and return its channels, what was not read, and what was not read as it stands."""
+    with TdmsWriter(path) as writer:
+        for segment in segments:
+            of_all = {"wf_increment": 1 / 250}
+            writer.write_segment([ChannelObject("rig", name, one, of_all | dict(more)) for name, one, more in segment])
+    told: list[str] = []
+    found = tvident.FileRecording(dict(variables(str(path), told)))
+    remarks = [one for one in told if isinstance(one, Remark)]
+    return found, "; ".join(one for one in told if one not in remarks), "; ".join(remarks)
+
+
+@pytest.mark.parametrize("start", [{}, {"wf_start_time": START}])
+def test_offsets_of_later_parts_are_times(tmp_path: Path, start: Mapping[str, Any]) -> None:
+    """A part that began 10 s after the start of all, by its offset, came right behind the first."""
+    parts: Any = [[("angle", ANGLE, {**start, "wf_start_offset": offset})] for offset in (2.0, 10.0, 11.2)]
+    found, _, remarks = read(tmp_path / "x.tdms", *parts)
+    np.testing.assert_allclose(found["time"], np.concatenate([2 + T, 10 + T, 11.2 + T]), atol=1e-9)
+    assert remarks == "channel angle: it was appended to 6.8 s after its end, as its times say"
+
+
+def test_a_part_without_a_unit_is_not_in_that_of_the_others(tmp_path: Path) -> None:
+    """Degrees were rad where the last part had no unit, and where the first had none nothing was said."""
+    parts: Any = [[("angle", ANGLE, {"unit_string": unit}), ("torque", TORQUE, {})] for unit in ("deg", "")]
+    found, skipped, _ = read(tmp_path / "x.tdms", *parts)
+    assert list(found) == ["time", "torque"]
+    assert "angle (it was appended to without a unit, after deg; read the parts one by one)" in skipped
+    found, skipped, remarks = read(tmp_path / "x.tdms", *parts[::-1])
+    assert (found["angle"].unit, skipped) == ("deg", "")
+    assert remarks == "channel angle: its unit, deg, was written at sample 300, and is taken for all of it"
