@@ -61,11 +61,31 @@ def test_labels_that_count_samples_are_no_times(labels: Any, name: str | None) -
         CALL(*series(labels, name))
 
 
+@pytest.mark.parametrize(
+    ("name", "labels"),
+    [
+        ("time [ms]", SECONDS * 1e3),
+        ("time_ms", np.arange(SECONDS.size)),
+        ("timestamp_us", 7 + 1000 * np.arange(SECONDS.size)),
+    ],
+)
+def test_whole_milliseconds_are_what_their_name_says(name: str, labels: Any) -> None:
+    """They were asked for: seconds that keep the name of what they were made from are no whole numbers."""
+    angle, torque = series(labels, name)
+    np.testing.assert_allclose(CALL(angle, torque).constants["inertia"][0], PLAIN, rtol=1e-9)
+    times = pd.Series(labels, name=name)
+    found = CALL(RIG.angle, RIG.torque, t=times)
+    np.testing.assert_allclose(found.constants["inertia"][0], PLAIN, rtol=1e-9)
+    np.testing.assert_allclose(found.time, SECONDS + found.time[0], atol=1e-9)
+    with pytest.raises(ValueError, match="where its name says"):
+        CALL(RIG.angle, RIG.torque, t=times / 1e3 if "ms" in name else times / 1e6)
+
+
 def test_labels_in_milliseconds_are_asked_for() -> None:
-    angle, torque = series(SECONDS * 1e3, "time [ms]")
+    angle, torque = series(SECONDS * 1e3 / 2, "time [ms]")
     with pytest.raises(ValueError, match=r"where its name says 'ms'.*time_unit='ms'"):
         CALL(angle, torque)
-    np.testing.assert_allclose(CALL(angle, torque, time_unit="ms").constants["inertia"][0], PLAIN, rtol=1e-9)
+    np.testing.assert_allclose(CALL(angle, torque, time_unit="ms").constants["inertia"][0], PLAIN / 4, rtol=1e-9)
     # A rate says what unnamed labels are in.
     halves = series(SECONDS * 500, "t")
     assert CALL(*halves, sample_rate=2000).settings["sample_rate"] == 2000

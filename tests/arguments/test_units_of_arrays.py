@@ -54,7 +54,9 @@ def test_the_unit_in_the_name_of_a_series_is_never_overlooked(series: Any) -> No
     assert_is_plain(series(ANGLE, "angle [deg]"), torque, angle_unit="rad", torque_unit="N mm")
     assert_is_plain(series(ANGLE, "angle [rad]"), series(TORQUE, "motor current [A]"))
     with pytest.raises(ValueError, match=r"the time must say its unit where its name says 'ms'"):
-        assert_is_plain(ANGLE, TORQUE, sample_rate=None, t=series(1000 * RIG.time, "t [ms]"))
+        assert_is_plain(ANGLE, TORQUE, sample_rate=None, t=series(RIG.time, "t [ms]"))
+    # Seconds are no whole numbers of milliseconds' name.
+    assert_is_plain(ANGLE, TORQUE, sample_rate=None, t=series(1000 * RIG.time, "t [ms]"))
     assert_is_plain(ANGLE, TORQUE, sample_rate=None, t=series(1000 * RIG.time, "t [ms]"), time_unit="ms")
 
 

@@ -8,7 +8,14 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from tvident._units.channel import has_unit_in_attributes, in_its_unit, is_computed_label, unit_named, unit_said
+from tvident._units.channel import (
+    are_as_named,
+    has_unit_in_attributes,
+    in_its_unit,
+    is_computed_label,
+    unit_named,
+    unit_said,
+)
 from tvident._units.quantities import LINEAR, ROTARY, System, UnitError, factor_to, is_convertible, system_of
 
 # What has no place to say a unit: the only ones that come a thousand times a second.
@@ -67,7 +74,7 @@ def axis_of(
     }
     system = system_of(units["angle"], units["torque"])
     for name in named:
-        if units[name]:
+        if units[name] and not (name == "time" and are_as_named(t, units[name])):
             _check_named(system, name, units[name])
     for name, unit in given.items():
         # Coordinates of time say their unit in no other way.
@@ -122,7 +129,10 @@ def times_in_seconds(t: Any, time_unit: str | None = None, *, has_argument: bool
     """Return times in seconds where they have another unit, and otherwise as they are; messages name the argument where there is one."""
     unit = time_unit or unit_said(t)
     if not unit and getattr(getattr(t, "dtype", None), "kind", "") not in {"m", "M"}:
-        _check_named(ROTARY, "time", unit_named(t), has_argument=has_argument)
+        named = unit_named(t)
+        if are_as_named(t, named):
+            unit = named
+        _check_named(ROTARY, "time", "" if unit else named, has_argument=has_argument)
     if not time_unit and is_computed_label(t):
         what = "arithmetic keeps attributes"
         _check_named(ROTARY, "time", unit, by="an attribute", what=what, has_argument=has_argument)

@@ -11,10 +11,13 @@ import numpy.typing as npt
 
 from tvident._units.names import named_unit
 from tvident._units.parse import unit_of
-from tvident._units.quantities import UnitError
+from tvident._units.quantities import ROTARY, UnitError, factor_to, is_convertible
 
 _SIGNS, _SUMS = (np.negative, np.positive, np.absolute, np.fabs), (np.add, np.subtract)
 """What leaves the unit as it is; sums where whatever is added has no other."""
+
+_ROUNDED = 1e-6
+"""By how much a whole number of milliseconds or microseconds may be another one, for rounding."""
 
 _JOINED = (np.concatenate, np.stack, np.vstack, np.hstack, np.column_stack)
 
@@ -219,6 +222,17 @@ def unit_named(values: Any) -> str:
     units = {named_unit(name)[1] for name in names if isinstance(name, str)}
     unit = units.pop() if len(units) == 1 else ""
     return unit if unit_of(unit) is not None else ""
+
+
+def are_as_named(times: Any, unit: str) -> bool:
+    """Return whether times are in the part of a second that their name says: whole numbers are, as those made seconds of would be none."""
+    if not is_convertible(ROTARY, "time", unit) or factor_to(ROTARY, "time", unit, name="the time") >= 1:
+        return False
+    numbers = np.asarray(times)
+    if numbers.ndim != 1 or numbers.dtype.kind not in "iuf" or numbers.size < 2:  # noqa: PLR2004 - a step
+        return False
+    whole = np.round(numbers)
+    return bool((np.abs(numbers - whole) <= _ROUNDED).all() and whole[0] != whole[-1])
 
 
 def in_its_unit(values: Any) -> Any:
