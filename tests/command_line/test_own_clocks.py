@@ -49,9 +49,16 @@ def test_one_clock_for_two_is_refused() -> None:
     alike = ["together" if one == "torque" else one for one in command]
     assert "clocks of their own" not in run(*alike, "--time", "rig.time").stderr
     assert "and got none; give --time rig.time --torque-time rig.time_2" in run(*command).stderr
-    compared = run("compare", "rig.tdms", "--angle", "angle", "--torque", "torque", "--time", "rig.time")
-    assert compared.returncode == 2
-    assert "channels of one clock; rig.tdms has rig.time and rig.time_2; resample one" in compared.stderr
+    compare = ("compare", "rig.tdms", "--angle", "angle", "--torque", "torque", "--time", "rig.time")
+    refused = run(*compare)
+    assert refused.returncode == 2
+    assert "give --time rig.time --torque-time rig.time_2, or the same for both" in refused.stderr
+    compared = run(*compare, "--torque-time", "rig.time_2", "--model", "none", "--model", "offset")
+    assert compared.returncode == 0, compared.stderr
+    assert "2 models" in compared.stdout
+    refused = run(*compare, "--methods")
+    assert refused.returncode == 2
+    assert "methods are compared on channels of one clock; rig.tdms has rig.time and rig.time_2" in refused.stderr
 
 
 def test_a_clock_is_that_of_the_group_of_the_angle(tmp_path: Path) -> None:

@@ -252,3 +252,18 @@ def test_a_models_name_is_drawn_as_text(tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         figure.savefig(tmp_path / "x.png")
+
+
+def test_channels_of_two_clocks_are_compared() -> None:
+    """They were to have one shape, with the advice to give the rates of both, which had been given."""
+    rig = tvident.simulate_torsional_rig(duration=4.0, seed=1)
+    angle, torque, t = (np.asarray(one) for one in (rig.angle, rig.torque, rig.time))
+    models: dict[str, Any] = {"spring": {"damping": 0.0}, "damped": {}, "known": {"inertia": 0.0123}}
+    alone = tvident.compare_models(angle, torque, models=models, sample_rate=1000)
+    for call in ({"sample_rate": (1000, 500)}, {"delta": (1e-3, 2e-3)}, {"t": (t, t[::2])}):
+        compared = tvident.compare_models(angle, torque[::2], models=models, **call)
+        assert compared.best in {"damped", "known"}
+        assert compared.table["weight"][list(compared.table["model"]).index("spring")] < 1e-6
+        value, error = compared.averaged["damping"]
+        expected, own = alone.averaged["damping"]
+        assert abs(np.median(value) - np.median(expected)) < 4 * np.hypot(np.median(error), np.median(own))

@@ -36,6 +36,7 @@ from tvident._command_line.options import CHANNELS, MISSING, TIME
     help="Compare methods instead: this one and those that came before. Errors are shown where FILE has the truth, as that of simulate.",
 )
 @click.option("--lag", metavar="TIME", help="Delay of the torque: seconds, '2 ms', or auto.")
+@click.option("--torque-time", metavar="NAME", help="Channel of times of the torque, where it has a clock of its own.")
 @click.option("--mask", metavar="NAME", help="Channel, or file, that is not zero where a sample may be used.")
 @click.option("--workers", type=int, help="Threads; by default all processors.")
 @click.option("--json", "as_json", is_flag=True, help="Print verdict, table and averaged parameters as JSON.")

@@ -42,6 +42,7 @@ def compare(
     torque_scale: str | None,
     models: tuple[str, ...],
     lag: str | None,
+    torque_time: str | None,
     mask: str | None,
     output: str | None,
     plot: str | None,
@@ -59,15 +60,15 @@ def compare(
         {RECORDING: file, "the angle": angle, "the torque": torque, "the mask": mask},
     )
     channels = channels_in(file)
-    check_own_clocks(channels, [angle, torque], time_channel, None, file, has_rate=False, takes_both=False)
+    check_own_clocks(channels, [angle, torque], time_channel, torque_time, file, has_rate=False, takes_both=not methods)
     check_has_times("compare needs", check_time(options["sample_rate"], options["delta"], time_channel), channels, file)
     common: dict[str, Any] = {
         name: parameter_of(value, channels, file) if name in COEFFICIENTS else value
         for name, value in given(options).items()
     }
-    if methods and (models or plot or lag or mask):
+    if methods and (models or plot or lag or mask or torque_time):
         raise click.UsageError(
-            "--methods compares methods alone; got options of models; leave --model, --plot, --lag and --mask out"
+            "--methods compares methods alone; got options of models; leave --model, --plot, --lag, --torque-time and --mask out"
         )
     scales = {"angle": angle_scale, "torque": torque_scale}
     signals = [
@@ -85,8 +86,10 @@ def compare(
         common["lag"] = lag_of(lag)
     if mask is not None:
         common["mask"] = mask_of(source_of(channels, mask, file))
+    if torque_time is not None and times is None:
+        raise click.UsageError("--torque-time needs the times of the angle, too; got none; give --time")
     if times is not None:
-        common["t"] = times
+        common["t"] = times if torque_time is None else (times, channel_of(channels, torque_time, file))
     result = tvident.compare_models(
         *signals,
         models={name: {"terms": terms_of(tuple(name.split(",")))} for name in models} or None,

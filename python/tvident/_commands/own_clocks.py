@@ -43,8 +43,8 @@ def check_own_clocks(
     first, last = (printable(named_unit(str(one))[0]) for one in (clocks[0], clocks[-1]))
     if not takes_both:
         raise click.UsageError(
-            f"candidates are compared on channels of one clock; {printable(file)} has {first} and {last}; resample one channel at the "
-            "times of the other, or give identify both clocks, and --term"
+            f"methods are compared on channels of one clock; {printable(file)} has {first} and {last}; resample one channel at the "
+            "times of the other, or leave --methods out"
         )
     cure = f"--time {shlex.quote(first)} --torque-time {shlex.quote(last)}"
     if not has_rate:

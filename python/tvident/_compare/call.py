@@ -34,9 +34,9 @@ def compare_models(
     torque: npt.ArrayLike,
     *,
     models: Mapping[str, Mapping[str, Any]] | None = None,
-    sample_rate: float | None = None,
-    delta: float | None = None,
-    t: npt.ArrayLike | None = None,
+    sample_rate: float | tuple[float, float] | None = None,
+    delta: float | tuple[float, float] | None = None,
+    t: npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
     **common: Any,
 ) -> ModelComparison:
     r"""Compare candidates for the equation of motion on one record.
@@ -53,12 +53,12 @@ def compare_models(
     models : mapping of str to mapping, optional
         Arguments of :func:`tvident.identify` by the model's name: ``{"spring": {"terms": ()}, "hard": {"terms": ("cubic",)}}``. By default
         with and without damping, offset, and cubic, gravity and Coulomb terms and quadratic drag; without gravity where the axis slides.
-    sample_rate : float
-        Samples per second. Give exactly one of `sample_rate`, `delta` and `t`.
-    delta : float
+    sample_rate : float or (float, float)
+        Samples per second, or those of angle and torque. Give exactly one of `sample_rate`, `delta` and `t`.
+    delta : float or (float, float)
         Sample period in seconds.
-    t : array_like, shape (n,)
-        Time of every sample in seconds.
+    t : array_like, shape (n,), or tuple of two
+        Time of every sample in seconds, or the times of the angle and those of the torque.
     common : optional
         Arguments of :func:`tvident.identify` for all models, such as ``stiffness="constant"`` or ``mask=``. A model's own win.
 
@@ -98,7 +98,10 @@ def compare_models(
     >>> compared.best
     'with damping'
     """
-    angles, _ = arguments.channels(angle=angle, torque=torque)
+    if any(isinstance(one, tuple) for one in (sample_rate, delta, t)):
+        angles = arguments.channel("angle", angle)
+    else:
+        angles, _ = arguments.channels(angle=angle, torque=torque)
     if sample_rate is None and delta is None and t is None:
         t = arguments.implied_times(angle)
     if angles.ndim != 1:
@@ -120,7 +123,9 @@ def compare_models(
     results: dict[str, Identification] = {
         name: identify(angle, torque, **{**time, **call, "method": method}) for name, call in calls.items()
     }
-    return ModelComparison(results, int(np.isfinite(angles).sum()))
+    # With two clocks, rows are on the grid of both.
+    size = next(iter(results.values())).time.size
+    return ModelComparison(results, int(np.isfinite(angles).sum()) if size == angles.size else size)
 
 
 def _candidates(angle: npt.ArrayLike, torque: npt.ArrayLike, common: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
