@@ -57,17 +57,23 @@ def marks_that_stay(numbers: Iterable[Numbers], period: float) -> list[tuple[int
 
 def without_masked_marks(one: Numbers, mask: npt.NDArray[np.bool_] | None) -> tuple[npt.NDArray[np.number], list[str]]:
     """Return a channel without marks that a mask leaves out, every one of them, and what was done in words: the mask says what they are."""
-    if mask is None or one.values.ndim > 1 or mask.shape != one.values.shape:
+    if mask is None:
         return one.values, []
-    values, words = one.values, []
-    for mark, places in _found(one, one.values):
-        if not mask[places].any():
-            values = values.astype(np.float64) if values is one.values else values
-            values[places] = np.nan
+    samples = one.values.shape[-1]
+    recorded, masks = one.values.reshape(-1, samples), np.broadcast_to(mask, one.values.shape).reshape(-1, samples)
+    several, words = one.values.ndim > 1, []
+    values = recorded
+    for record, (own, kept) in enumerate(zip(recorded, masks, strict=True)):
+        for mark, places in _found(one, own):
+            if kept[places].any():
+                continue
+            values = recorded.astype(np.float64) if values is recorded else values
+            values[record, places] = np.nan
             words.append(
-                f"the {one.name} is {mark:.7g} at {places.size} samples, which mask= leaves out: they are taken as missing"
+                f"{f'record {record}: ' if several else ''}the {one.name} is {mark:.7g} at {places.size} samples, which mask= leaves out: "
+                "they are taken as missing"
             )
-    return values, words
+    return one.values if values is recorded else values.reshape(one.values.shape), words
 
 
 def _found(one: Numbers, recorded: npt.NDArray[np.number]) -> list[tuple[float, npt.NDArray[np.intp]]]:
@@ -87,7 +93,7 @@ def _questions(one: Numbers, recorded: npt.NDArray[np.number], period: float) ->
     ]
     is_driven = any(0 < mark < _NO_TORQUE for mark, _ in found)
     is_driven = is_driven and all(_is_turned_on(places, recorded.size) for _, places in found)
-    if one.name.startswith("torque") and is_driven:
+    if one.name.startswith(("torque", "instrument")) and is_driven:
         return []
     return [_question(one.name, mark, places, period) for mark, places in found]
 

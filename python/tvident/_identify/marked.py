@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,9 @@ from tvident import _arguments as arguments
 from tvident._advice import Numbers, marks_that_stay, without_masked_marks
 from tvident._equation import COEFFICIENTS
 from tvident._units import Axis
+
+if TYPE_CHECKING:
+    from tvident._merged import Masses, Trials
 
 Array = npt.NDArray[np.number]
 
@@ -32,7 +35,7 @@ def without_marks(
     numbers = [Numbers(name, values, factors[name], turns.get(name, 0.0)) for name, values in channels.items()]
     mask = arguments.mask("mask", call["mask"], channels["torque"].shape)
     said: list[str] = []
-    if mask is not None and call["nan_policy"] == "omit":
+    if mask is not None:
         found = [without_masked_marks(one, mask) for one in numbers]
         numbers = [replace(one, values=values) for one, (values, _) in zip(numbers, found, strict=True)]
         said = [line for _, words in found for line in words]
@@ -54,6 +57,46 @@ def _beside(call: Mapping[str, Any], shape: tuple[int, ...]) -> Iterator[Numbers
         if values.dtype.kind in "iuf" and values.ndim and values.shape[-1] == shape[-1]:
             whole = values if values.shape == shape else values.reshape(-1, shape[-1])[:1]
             yield Numbers(name, whole, is_measured=False)
+
+
+def without_masked(
+    trials: Trials | None, masses: list[Masses], axis: Axis
+) -> tuple[Trials | None, list[Masses], tuple[str, ...]]:
+    """Return trials, or masses, without marks that their masks leave out, and what was done in words."""
+    said: list[str] = []
+
+    def cleared(name: str, values: Any, factor: float, mask: Any) -> Any:
+        if values is None or mask is None:
+            return values
+        found, words = without_masked_marks(Numbers(name, values, factor), mask)
+        said.extend(words)
+        return found
+
+    if trials is not None:
+        masks: Sequence[Any] = trials.masks or [None] * len(trials.angles)
+        changed: dict[str, Any] = {
+            f"{name}s": [
+                cleared(f"{name} of trial {place}", one, factor, mask)
+                for place, (one, mask) in enumerate(zip(each, masks, strict=True))
+            ]
+            for name, each, factor in (("angle", trials.angles, axis.angle), ("torque", trials.torques, axis.torque))
+        }
+        return replace(trials, **changed), masses, tuple(said)
+    left = [
+        replace(
+            one,
+            angles=[
+                cleared(f"angle of channel {place}", each, axis.angle, one.mask)
+                for place, each in enumerate(one.angles)
+            ],
+            torques=[
+                cleared(f"torque of channel {place}", each, axis.torque, one.mask)
+                for place, each in enumerate(one.torques)
+            ],
+        )
+        for one in masses
+    ]
+    return None, left, tuple(said)
 
 
 def asked_of_trials(

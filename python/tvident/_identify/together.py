@@ -16,7 +16,7 @@ from tvident._equation import LINEAR_UNITS, OFFSET, UNITS, Unknown, all_terms
 from tvident._identify.columns import WINDOW_OF_TERMS, Columns
 from tvident._identify.earlier import check_no_own_terms
 from tvident._identify.expanded_terms import expansions_of_terms, in_windows
-from tvident._identify.marked import asked_of_trials
+from tvident._identify.marked import asked_of_trials, without_masked
 from tvident._identify.methods import SHORTEST_TEST_FUNCTION, WeakForm, exponent_of
 from tvident._units import (
     ROTARY,
@@ -172,9 +172,10 @@ def identify_together(angle: Any, torque: Any, options: Options) -> MergedIdenti
             )
     # One of them is None.
     trials, masses = (_trials if options.dof_axis is None else _masses)(angle, torque, options, axis)
+    trials, masses, said = without_masked(trials, masses, axis)
     sampling = _sampling(options, axis, *_channels(trials, masses))
     asked_of = asked_of_trials(*_channels(trials, masses), axis, sampling.period, has_masses=trials is None)
-    sampling = replace(sampling, questions=asked_of)
+    sampling = replace(sampling, questions=asked_of, said=said)
     with arguments.reporter(options.progress, "identification") as report:
         asked = AskedTogether(
             sampling=sampling,

@@ -48,6 +48,8 @@ class Sampling:
         How short gaps were bridged; None where none were.
     questions : sequence of str
         What cannot be known of the samples.
+    said : sequence of str
+        What was done with them.
     """
 
     period: float
@@ -57,6 +59,7 @@ class Sampling:
     workers: int | None = None
     bridges: Timed | None = None
     questions: Sequence[str] = ()
+    said: Sequence[str] = ()
 
     @classmethod
     def of_grid(
@@ -88,7 +91,7 @@ class Sampling:
     @property
     def of_result(self) -> Sampling:
         """The times of what was found, without how they came about."""
-        return replace(self, clock=None, passed=None, bridges=None, questions=())
+        return replace(self, clock=None, passed=None, bridges=None, questions=(), said=())
 
     def times(self, samples: int) -> npt.NDArray[np.float64]:
         """Return the times of samples in seconds."""

@@ -37,7 +37,7 @@ def verdict_of(result: Any, merging: Merging) -> str:
     if len(lost) == len(asked):
         return verdict_of_distrusted(result, "nothing can be known of what was asked")
     share: float | None = result._share  # noqa: SLF001 - of this room
-    reason = why_not(result, lambda: _sign(result, merging), lambda: share) or found_marked(result.advice)
+    reason = found_marked(result.advice) or why_not(result, lambda: _sign(result, merging), lambda: share)
     if reason:
         return verdict_of_distrusted(result, reason)
     known = _known(result, merging)

@@ -38,6 +38,7 @@ def words_of(result: Any, merging: Merging, scatter: Mapping[str, float]) -> Wor
     """Return reasons and advice."""
     sampling = merging.sampling
     reasons, advice = ([one] if one else [] for one in (sampling.words, sampling.doubt))
+    reasons += sampling.said
     advice += sampling.questions
     for part in merging.parts:
         one = part.found

@@ -99,7 +99,8 @@ def _verdict(result: Any, share: float | None) -> str:
 
 def _of_one(result: Any, known: float | None) -> str:
     share = cache(lambda: explained(result) if known is None else known)  # a prediction of the whole record
-    reason = _distrusted(result, share) or found_marked(result.advice) or _found_elsewhere(result.advice)
+    # What was never measured is what else looks wrong.
+    reason = found_marked(result.advice) or _distrusted(result, share) or _found_elsewhere(result.advice)
     if reason:
         return verdict_of_distrusted(result, reason)
     return verdict_of_trusted(result, _errors(result), share())
@@ -191,7 +192,8 @@ def share_of(recorded: Any, predicted: Any) -> float | None:
 
 def distrust(result: Any) -> str | None:
     """Return why numbers of a record are not to be trusted, in words; None where nothing says so."""
-    return _distrusted(result, lambda: explained(result))
+    # Without what is tried of a record alone, which takes as long as to identify it.
+    return found_marked(result._chosen.advice) or _distrusted(result, lambda: explained(result))  # noqa: SLF001 - of this room
 
 
 def _distrusted(result: Any, share: Callable[[], float | None]) -> str | None:
