@@ -286,6 +286,13 @@ def test_a_current_is_told_what_makes_a_torque_of_it(text: str) -> None:
         factor_to(ROTARY, "torque", text, name="the torque")
 
 
+@pytest.mark.parametrize("text", ["%", "% rated", "[%]"])
+def test_a_percentage_of_a_torque_is_told_what_makes_a_torque_of_it(text: str) -> None:
+    """Drives record it; the torque was to be one that is in N m already."""
+    with pytest.raises(ValueError, match="a percentage must be multiplied by the torque of 1 %"):
+        factor_to(ROTARY, "torque", text, name="the torque")
+
+
 @pytest.mark.parametrize(
     "text", ["Degree(s)", "[Degree(s)]", "(deg)", "((deg))", "< deg >", "Nm/(rad/s)", "(Nm", "N(m)", "[]", "(-)"]
 )

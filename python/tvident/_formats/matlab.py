@@ -28,6 +28,8 @@ _UNITS = ("unit", "units")
 """Fields of a structure that is one channel."""
 _NAMES = ("name", "names", "label", "channel", "channelname", "signalname", "title", "blockname")
 """Fields of an array of structures that call its channels; a scope of Simulink has a label, which may be empty, and a name of a block."""
+_DATA, _HEADER = "_Data", "_Header"
+"""Ends of the names of samples and of what is said of them, as catman writes them."""
 _SHAPES = ("dimensions",)
 """What Simulink says beside the samples."""
 
@@ -70,20 +72,22 @@ def _names(path: str, error: Exception) -> list[str]:
         raise error from None
 
 
-def _flat(prefix: str, variables: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Give the leaves of nested structures with names joined by dots, and with units where structures have these."""
+def _flat(
+    prefix: str, variables: Mapping[str, Any], beside: Mapping[str, Any] | None = None
+) -> Iterator[tuple[str, Any]]:
+    """Give the leaves of nested structures with names joined by dots, and with units where structures, or one beside them, have these."""
     fields = {str(name): value for name, value in variables.items() if not str(name).startswith("__")}
     of_dspace = list(_of_dspace(fields))
     if of_dspace:
         yield from ((prefix + name, value) for name, value in of_dspace)
         return
-    fields = _by_column(fields)
+    fields = _by_column(_with_headers(fields))
     units: Mapping[str, Any] = next((fields[name] for name in _UNITS if isinstance(fields.get(name), Mapping)), {})
     for name, value in fields.items():
         if value is units and units:
             continue
         if not isinstance(value, Mapping):
-            yield _with_unit(f"{prefix}{name}", units.get(name, "")), value
+            yield _with_unit(f"{prefix}{name}", units.get(name, (beside or {}).get(name, ""))), value
             continue
         several = _several_channels(value)
         if several:
@@ -91,11 +95,28 @@ def _flat(prefix: str, variables: Mapping[str, Any]) -> Iterator[tuple[str, Any]
             continue
         channel = _one_channel(value)
         if channel is None:
-            yield from _flat(f"{prefix}{name}.", value)
+            within = units.get(name, (beside or {}).get(name))
+            yield from _flat(f"{prefix}{name}.", value, within if isinstance(within, Mapping) else units or beside)
             continue
         samples, unit, rest = channel
         yield _with_unit(f"{prefix}{name}", unit), samples
         yield from _flat(f"{prefix}{name}.", rest)
+
+
+def _with_headers(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Return variables with those named and in the unit that a header beside them says: ``Channel_1_Data``, ``Channel_1_Header``."""
+    found, used = dict(fields), set(fields)
+    for name, samples in fields.items():
+        header = fields.get(f"{name[: -len(_DATA)]}{_HEADER}") if name.endswith(_DATA) else None
+        if not isinstance(header, Mapping) or isinstance(samples, Mapping):
+            continue
+        lower = {str(key).lower(): value for key, value in header.items()}
+        own = next((str(lower[key]).strip() for key in _NAMES if _is_word(lower.get(key))), name)
+        unit = next((str(lower[key]).strip() for key in _UNITS if _is_word(lower.get(key))), "")
+        full = _with_unit(own if own == name or own not in used else f"{name}.{own}", unit)
+        used.add(own)
+        found = {full if key == name else key: value for key, value in found.items()}
+    return found
 
 
 def _by_column(fields: Mapping[str, Any]) -> dict[str, Any]:

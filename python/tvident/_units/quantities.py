@@ -126,12 +126,13 @@ def factor_to(system: System, quantity: str, text: str | None, *, name: str) -> 
         raise UnitError(
             f"the unit of {name} must mean one thing; got {text!r}: {doubt}; give {quantity}_unit={meant!r}, or another"
         )
+    part = "; a percentage must be multiplied by the torque of 1 %" if quantity == "torque" and "%" in text else ""
     if unit is None:
-        raise UnitError(f"the unit of {name} must be one that is known; got {text[:_SHOWN]!r}; {cure}")
+        raise UnitError(f"the unit of {name} must be one that is known; got {text[:_SHOWN]!r}; {cure}{part}")
     factor = _in(unit, system.dimensions[quantity])
     if not math.isfinite(factor):
         is_electrical = quantity == "torque" and unit.dimension in {_AMPERE, _VOLT}
-        more = (
+        more = part.removeprefix("; ") or (
             "a current or a voltage must be multiplied by the torque of one A or V"
             if is_electrical
             else "a factor of your own converts it too"
