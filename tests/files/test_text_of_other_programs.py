@@ -210,3 +210,31 @@ def test_western_names_are_read_without_a_word(tmp_path: Path, name: str) -> Non
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert list(recordings.read(place)) == ["t [s]", name]
+
+
+@pytest.mark.parametrize("has_blank", [False, True])
+def test_scopes_of_twincat_say_before_each_pair_what_a_line_holds(tmp_path: Path, *, has_blank: bool) -> None:
+    """Channels were called Unit, deg, Unit_2 and Nm, and a line of tabs below them was a sample."""
+    lines = ["Name\tRotor\t\t", "Name\tPos\tName\tTrq", "Data-Type\tREAL64\tData-Type\tREAL64"]
+    lines += ["SampleTime[ms]\t1\tSampleTime[ms]\t1", "Unit\tdeg\tUnit\tNm", *(["\t\t\t"] if has_blank else [])]
+    lines += [f"{k}\t{k / 7:.5f}\t{k}\t{k / 3:.5f}" for k in range(50)]
+    path = tmp_path / "scope.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        found = tvident.read_recording(path)
+    units = {name: values.unit for name, values in found.items()}
+    assert units == {"time": "ms", "Pos": "deg", "time_2": "ms", "Trq": "Nm"}
+    np.testing.assert_allclose(found["Trq"], np.arange(50) / 3, atol=1e-5)
+    assert any("the first row holds nothing" in str(one.message) for one in said) == has_blank
+
+
+@pytest.mark.parametrize("separator", ["\t", ";", ","])
+def test_separators_alone_below_the_names_are_no_sample(tmp_path: Path, separator: str) -> None:
+    """They were a first sample in which nothing was measured, and all others came later."""
+    rows = [f"{k}{separator}{k}.5" for k in range(30)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([f"time [ms]{separator}angle", separator, separator, *rows]) + "\n", encoding="utf-8")
+    with pytest.warns(recordings.FileWarning, match="the first 2 rows hold nothing: not read"):
+        found = recordings.read(path)
+    np.testing.assert_array_equal(found["angle"], np.arange(30) + 0.5)

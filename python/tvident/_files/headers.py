@@ -302,7 +302,7 @@ def _without_keys(above: Sequence[Line], most: int) -> list[Line]:
     }
     titles = keyed.get("channeltitle")
     if titles is None:
-        return list(above)
+        return _without_repeated_keys(above, most)
     # Times stand before the channels, and have no title.
     has_times = len(titles.cells) == most
     units = keyed.get("unitname", keyed.get("range"))
@@ -311,6 +311,25 @@ def _without_keys(above: Sequence[Line], most: int) -> list[Line]:
             of_channels = [_RANGE.sub(r"\1", cell) if line is units else cell for cell in line.cells[1:]]
             line.cells = [of_times, *of_channels] if has_times else of_channels
     return [line for line in above if line not in keyed.values() or line in {titles, units}]
+
+
+def _without_repeated_keys(above: Sequence[Line], most: int) -> list[Line]:
+    """Return lines above pairs of times and samples, which begin every pair with what they say of it, as scopes of TwinCAT write them."""
+    keyed = {line.cells[0].casefold(): line for line in above if _is_keyed_in_pairs(line, most)}
+    names, units = keyed.get("name"), keyed.get("unit")
+    if names is None:
+        return list(above)
+    unit = next((named_unit(line.cells[0])[1] for key, line in keyed.items() if key.startswith("sampletime[")), "")
+    for line, of_times in ((names, "time"), (units, unit)):
+        if line is not None:
+            cells = [*line.cells, *[""] * (most - len(line.cells))]
+            line.cells = [cell if place % 2 else of_times for place, cell in enumerate(cells)]
+    return [line for line in above if line in {names, units}]
+
+
+def _is_keyed_in_pairs(line: Line, most: int) -> bool:
+    keys = line.cells[::2]
+    return most > 2 and most % 2 == 0 and len(keys) == most // 2 and len(set(keys)) == 1 and bool(keys[0])  # noqa: PLR2004 - pairs
 
 
 def _share_of_units(cells: Sequence[str]) -> float:

@@ -12,6 +12,7 @@ from typing import IO, TextIO, TypeVar
 
 import numpy as np
 
+from tvident._arguments import is_called_time
 from tvident._files.channels import Channels, FileError, Say
 from tvident._files.dialect import Dialect, dialect_of, mixed_line
 from tvident._files.headers import CURE
@@ -203,12 +204,25 @@ def _begun(file: TextIO, decimal: str | None, say: Say) -> tuple[Dialect, Rows, 
         return None
     if file.encoding == _WESTERN_EUROPEAN:
         _say_foreign(dialect.names, say)
-    dialect = replace(dialect, decimal=decimal)
+    dialect = replace(dialect, decimal=decimal, first=_first_that_holds_anything(lines, dialect, say))
     rows = Rows(dialect, say)
     rows.skip(dialect.first)
     first = "\n".join(lines[dialect.first :])
     pieces = chain([first], _pieces(file, head.count("\n")))
     return dialect, rows, map(rows.read, pieces)
+
+
+def _first_that_holds_anything(lines: Sequence[str], dialect: Dialect, say: Say) -> int:
+    """Return the first row that has a cell: where samples have times, separators alone below the names are none."""
+    first, separator = dialect.first, dialect.separator
+    if separator is None or not any(is_called_time(named_unit(name)[0]) for name in dialect.names):
+        return first
+    while first + 1 < len(lines) and separator in lines[first] and not lines[first].strip(f'{separator}" \t\r'):
+        first += 1
+    if first > dialect.first:
+        many = first - dialect.first
+        say(f"the first {'row holds' if many == 1 else f'{many} rows hold'} nothing: not read")
+    return first
 
 
 def _say_foreign(names: Sequence[str], say: Say) -> None:
