@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -391,3 +392,27 @@ def test_lines_without_the_channel_end_with_the_key_that_is_missing(lines: str, 
     assert done.returncode == 1
     assert words in done.stderr
     assert "lines must hold the channels; got none that does" in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_an_interrupt_waits_for_what_is_being_written(unbuffered: str) -> None:
+    """Half a line was left in the middle of the output, and what followed it was another sample's."""
+    command = [sys.executable, "-m", "tvident", "live", "--angle", "0", "--torque", "1", "--sample-rate", "1000"]
+    rows = "".join(f"{a!r},{b!r}\n" for a, b in zip(RIG.angle.tolist(), RIG.torque.tolist(), strict=True))
+    pipe = subprocess.PIPE
+    environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, env=environment) as program:
+        assert program.stdin is not None
+        program.stdin.write(rows)
+        program.stdin.flush()
+        # Nobody reads what it writes, so it stands within a line.
+        time.sleep(2.0)
+        program.send_signal(signal.SIGINT)
+        time.sleep(0.3)
+        out, words = program.communicate(timeout=60)
+    assert program.returncode == 0
+    assert "ended by Ctrl-C" in words
+    times = [json.loads(line)["timestamp"] for line in out.splitlines()]
+    np.testing.assert_allclose(times, np.arange(len(times)) / 1000, atol=1e-9)
+    assert f"parameters of {len(times)} given" in words

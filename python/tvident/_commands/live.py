@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
+import signal
 import sys
+import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
 from typing import Any
 
 import click
@@ -160,7 +164,7 @@ def _run(
     end = math.inf if duration is None else time.monotonic() + duration
     is_said = is_silent = False
     heard = time.monotonic()
-    try:
+    with _interrupted_between_pieces() as is_interrupted:
         for piece in pieces:
             now = time.monotonic()
             heard, is_silent = (now, False) if piece else (heard, is_silent)
@@ -171,9 +175,31 @@ def _run(
             if not is_said and session.clock.comes_faster:
                 is_said = True
                 click.echo(f"Warning: {session.clock.comes_faster}", err=True)
+            if is_interrupted():
+                click.echo("ended by Ctrl-C", err=True)
+                break
             if time.monotonic() >= end:
                 break
-    except KeyboardInterrupt:
-        click.echo("ended by Ctrl-C", err=True)
-    with np.errstate(all="ignore"):
-        session.finish()
+        with np.errstate(all="ignore"):
+            session.finish()
+
+
+@contextmanager
+def _interrupted_between_pieces() -> Iterator[Callable[[], bool]]:
+    """Let the first Ctrl-C wait for what is being written, since half a line can be read by nobody; the second ends at once."""
+    usual, is_asked = signal.getsignal(signal.SIGINT), False
+    is_heard = threading.current_thread() is threading.main_thread() and callable(usual)
+
+    def hear(number: int, frame: FrameType | None) -> None:
+        nonlocal is_asked
+        if is_asked and callable(usual):
+            usual(number, frame)
+        is_asked = True
+
+    if is_heard:
+        signal.signal(signal.SIGINT, hear)
+    try:
+        yield lambda: is_asked
+    finally:
+        if is_heard:
+            signal.signal(signal.SIGINT, usual)

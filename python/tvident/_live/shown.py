@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import socket
@@ -57,6 +58,18 @@ def _lines(times: Sequence[float], columns: Columns) -> list[str]:
     return found
 
 
+def _write(output: IO[str], text: str) -> None:
+    """Write all of a text: where nothing is buffered (``PYTHONUNBUFFERED``) Python drops what a pipe does not take before a signal."""
+    raw = getattr(output, "buffer", None)
+    if not isinstance(raw, io.RawIOBase):
+        output.write(text)
+        output.flush()
+        return
+    left = memoryview(text.encode())
+    while left:
+        left = left[raw.write(left) or 0 :]
+
+
 class JsonLines:
     """One object a sample and line, with ``timestamp`` and a key for every number.
 
@@ -71,8 +84,7 @@ class JsonLines:
     def show(self, times: Sequence[float], columns: Columns) -> None:
         """Write samples."""
         if len(times):
-            self._output.write("\n".join(_lines(times, columns)) + "\n")
-            self._output.flush()
+            _write(self._output, "\n".join(_lines(times, columns)) + "\n")
 
 
 class Udp:
