@@ -15,6 +15,7 @@ from scipy.io import savemat
 import tvident
 from commands import run
 from tvident._command_line.compare import compare
+from tvident._command_line.derivatives import derivatives
 from tvident._command_line.identify import identify
 from tvident._commands import in_options
 
@@ -84,8 +85,10 @@ def test_the_cure_can_be_typed(words: str, typed: str) -> None:
 
 
 def test_clocks_of_channels_are_given_to_a_command_that_takes_them() -> None:
-    with click.Context(compare):
+    with click.Context(derivatives):
         assert in_options("give t=(t, t)") == "give --torque-time of tvident identify with the channel of --time"
+    with click.Context(compare):
+        assert in_options("give t=(t, t)") == "give --torque-time with the channel of --time"
 
 
 @pytest.mark.usefixtures("folder")
