@@ -19,6 +19,9 @@ _BUFFERED = 360
 _SECOND = 0.5
 """Seconds in which a second device answers to a name that a first has answered to."""
 
+_AGAIN = 10.0
+"""Seconds in which an outlet that began again answers, at most; what it sends meanwhile is kept."""
+
 _UNDER_WAY = 1.0
 """Seconds that samples take to who listens: what an outlet has not sent when it goes is lost."""
 
@@ -108,11 +111,9 @@ class Inlet:
     def _check_same(self) -> None:
         """Refuse an outlet that began again with other channels: the layer goes on with whatever has the same source."""
         pylsl = _library()
-        for found in (
-            pylsl.resolve_byprop("source_id", self._source, minimum=1, timeout=_SECOND) if self._source else []
-        ):
+        for found in pylsl.resolve_byprop("source_id", self._source, minimum=1, timeout=_AGAIN) if self._source else []:
             try:
-                said = _said(pylsl.StreamInlet(found, recover=False).info(timeout=_SECOND))
+                said = _said(pylsl.StreamInlet(found, recover=False).info(timeout=_AGAIN))
             except (self._lost, pylsl.util.TimeoutError):
                 continue
             if said != self._said:
