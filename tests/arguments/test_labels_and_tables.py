@@ -81,6 +81,14 @@ def test_whole_milliseconds_are_what_their_name_says(name: str, labels: Any) -> 
         CALL(RIG.angle, RIG.torque, t=times / 1e3 if "ms" in name else times / 1e6)
 
 
+@pytest.mark.parametrize("unit", ["s", "ms", "us"])
+def test_a_unit_that_is_given_counts_more_than_one_in_a_name(unit: str) -> None:
+    """Whole seconds called `time_ms` were milliseconds where `time_unit="s"` was given: an inertia of a millionth, without a word."""
+    times = pd.Series(np.arange(SECONDS.size), name="time_ms")
+    found = CALL(RIG.angle, RIG.torque, t=times, time_unit=unit)
+    assert found.settings["sample_rate"] == pytest.approx({"s": 1.0, "ms": 1e3, "us": 1e6}[unit])
+
+
 def test_labels_in_milliseconds_are_asked_for() -> None:
     angle, torque = series(SECONDS * 1e3 / 2, "time [ms]")
     with pytest.raises(ValueError, match=r"where its name says 'ms'.*time_unit='ms'"):

@@ -137,8 +137,8 @@ def times_in_seconds(t: Any, time_unit: str | None = None, *, has_argument: bool
         what = "arithmetic keeps attributes"
         _check_named(ROTARY, "time", unit, by="an attribute", what=what, has_argument=has_argument)
     factor = factor_to(ROTARY, "time", unit, name="the time")
-    # What says another unit than the one that was given would be converted by whoever takes it next.
-    is_plain = factor == 1 and (time_unit is None or not unit_said(t))
+    # What says or is called by another unit than the one that was given would be converted by whoever takes it next.
+    is_plain = factor == 1 and (time_unit is None or not (unit_said(t) or unit_named(t)))
     return t if is_plain else scaled(np.asarray(in_its_unit(t)), factor)
 
 
