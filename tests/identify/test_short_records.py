@@ -45,11 +45,16 @@ def test_a_record_that_is_too_short_has_no_numbers_and_says_so(short: int, metho
     assert np.array_equal(found[1].time, found[0].time[:short])
 
 
-def test_what_is_shared_is_of_the_others() -> None:
-    found = tvident.identify(**lists(30), sample_rate=1000, share=("inertia",))
+@pytest.mark.parametrize(("share", "method"), [("inertia", "auto"), ("stiffness", "auto"), ("inertia", "paper")])
+def test_what_is_shared_is_of_the_others(share: str, method: Literal["auto", "paper"]) -> None:
+    # What changes elsewhere, or is windowed by the method, was looked for among the constants of the short record: a raw KeyError.
+    found = tvident.identify(**lists(30), sample_rate=1000, share=(share,), method=method)
     one, other = RIGS
-    of_two = tvident.identify([one.angle, other.angle], [one.torque, other.torque], sample_rate=1000, share="inertia")
+    channels = [one.angle, other.angle], [one.torque, other.torque]
+    of_two = tvident.identify(*channels, sample_rate=1000, share=share, method=method)
     assert found.constants == of_two.constants
+    if share != "inertia" or method == "paper":
+        return
     assert "record 1 says nothing of inertia" in found.advice[0]
     assert same(found[2].stiffness, of_two[1].stiffness)
 
@@ -80,5 +85,11 @@ def test_what_is_wrong_otherwise_is_refused_as_before() -> None:
     with pytest.raises(ValueError, match=r"\(record 1 of 3\)"):
         tvident.identify(**call, sample_rate=1000)
     one, other = RIGS
+    # Of two samples nothing is known, but they must be as many as those of the other channel, and as their times.
+    with pytest.raises(ValueError, match=r"shape.*\(record 1 of 2\)"):
+        tvident.identify([one.angle, other.angle[:2]], [one.torque, other.torque], sample_rate=1000)
+    times = np.arange(one.angle.size) / 1000
+    with pytest.raises(ValueError, match=r"one time for each of the 2 samples.*\(record 1 of 2\)"):
+        tvident.identify([one.angle, other.angle[:2]], [one.torque, other.torque[:2]], t=[times, times])
     with pytest.raises(ValueError, match="at least 64 samples"):
         tvident.identify([one.angle[:30], other.angle[:20]], [one.torque[:30], other.torque[:20]], sample_rate=1000)

@@ -118,15 +118,16 @@ def identify_records(
         def every(change: Callable[[int], Mapping[str, Any]]) -> list[Identification]:
             nonlocal before
             found = []
-            for place, call in enumerate(calls):
-                begin = before
+            for place, own in enumerate(calls):
+                call, begin = {**own, **change(place)}, before
                 tell = None if report is None else lambda done, _, begin=begin: report(begin + done, total)
                 try:
-                    found.append(single(**{**call, **change(place), "progress": tell}))
+                    found.append(single(**{**call, "progress": tell}))
                 except (ValueError, TypeError) as error:
                     if report is not None and report.error is error:
                         raise
-                    short = None if not isinstance(error, ValueError) else without_numbers(single, calls, place, error)
+                    changed = [*calls[:place], call, *calls[place + 1 :]]
+                    short = without_numbers(single, changed, place, error) if isinstance(error, ValueError) else None
                     if short is not None:
                         found.append(short)
                         before += sizes[place]

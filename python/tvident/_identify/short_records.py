@@ -42,7 +42,7 @@ def without_numbers(
     sizes = [_samples(call) for call in calls]
     longest, size = calls[int(np.argmax(sizes))], sizes[place]
     is_short = size <= _TOO_SHORT or any(words in str(error) for words in _OF_LENGTH)
-    if size >= max(sizes) or not is_short:
+    if size >= max(sizes) or not is_short or not _are_of_one_length(calls[place], size):
         return None
     missing = {name: _missing(longest[name]) for name in _CHANNELS}
     others = {name: longest[name] for name in _OF_SAMPLES}
@@ -62,6 +62,15 @@ def _missing(channel: Any) -> Any:
 def _samples(call: Mapping[str, Any]) -> int:
     """Return how many samples of the motion a record has."""
     return next(int(np.size(call[name])) for name in _CHANNELS if call[name] is not None)
+
+
+def _are_of_one_length(call: Mapping[str, Any], size: int) -> bool:
+    """Return whether channels and times of a record are as long as each other, or of clocks of their own."""
+    if any(isinstance(call[name], tuple) for name in ("sample_rate", "delta", "t")):
+        return True
+    times = call["t"]
+    given = [call[name] for name in _CHANNELS] + [times if np.ndim(times) else None]
+    return all(one is None or int(np.size(one)) == size for one in given)
 
 
 def _times(given: Any) -> Any:
