@@ -267,3 +267,8 @@ def test_channels_of_two_clocks_are_compared() -> None:
         value, error = compared.averaged["damping"]
         expected, own = alone.averaged["damping"]
         assert abs(np.median(value) - np.median(expected)) < 4 * np.hypot(np.median(error), np.median(own))
+    # Samples that are missing are no observations.
+    angle[1000:2500] = np.nan
+    one = tvident.compare_models(angle, torque, models=models, sample_rate=1000)
+    two = tvident.compare_models(angle, torque[:-1], models=models, sample_rate=(1000, 1000))
+    assert two.observations == pytest.approx(one.observations, rel=0.02)

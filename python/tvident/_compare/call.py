@@ -124,8 +124,8 @@ def compare_models(
         name: identify(angle, torque, **{**time, **call, "method": method}) for name, call in calls.items()
     }
     # With two clocks, rows are on the grid of both.
-    size = next(iter(results.values())).time.size
-    return ModelComparison(results, int(np.isfinite(angles).sum()) if size == angles.size else size)
+    samples = next(iter(results.values())).time.size
+    return ModelComparison(results, round(samples * float(np.isfinite(angles).mean())))
 
 
 def _candidates(angle: npt.ArrayLike, torque: npt.ArrayLike, common: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
