@@ -37,6 +37,16 @@ def units_in(path: Path, content: dict[str, Any]) -> dict[str, str]:
             },
             {"d.a.angle": "deg", "d.b.angle": "mrad"},
         ),
+        # A structure without samples is of settings.
+        (
+            {"data": BOTH, "limits": {"angle": 90.0}, "units": UNITS},
+            {"data.angle": "deg", "data.torque": "Nmm"},
+        ),
+        # Times beside it are no channel of another unit.
+        (
+            {"time": examples.T, "data": BOTH, "units": {"time": "s", **UNITS}},
+            {"time": "s", "data.angle": "deg", "data.torque": "Nmm"},
+        ),
         # Its own come first.
         (
             {"data": {**BOTH, "units": {"angle": "mrad"}}, "units": UNITS},
@@ -49,6 +59,53 @@ def test_a_structure_of_units_is_of_the_structure_beside_it(
 ) -> None:
     """Millimetres and kilonewtons of `data` were rad and N m, and K was trusted."""
     assert units_in(tmp_path / "x.mat", content) == expected
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        ({**BOTH, "units": UNITS, "si": BOTH}, {**UNITS, "si.angle": "", "si.torque": ""}),
+        ({"angle": ANGLE, "units": UNITS, "si": BOTH}, {"angle": "deg", "si.angle": "", "si.torque": ""}),
+        ({"data": {"si": BOTH}, "units": UNITS}, {"data.si.angle": "", "data.si.torque": ""}),
+        (
+            {"data": {**BOTH, "si": BOTH}, "units": UNITS},
+            {"data.angle": "deg", "data.torque": "Nmm", "data.si.angle": "", "data.si.torque": ""},
+        ),
+        # Where it names those, too, it is of them.
+        (
+            {"angle": ANGLE, "si": {"angle": ANGLE}, "units": {"angle": "deg", "si": {"angle": "rad"}}},
+            {"angle": "deg", "si.angle": "rad"},
+        ),
+    ],
+)
+def test_a_structure_of_units_is_not_of_converted_copies(
+    tmp_path: Path, content: dict[str, Any], expected: dict[str, str]
+) -> None:
+    """Radians in `si` were degrees, and a stiffness 57 times too large was trusted."""
+    assert units_in(tmp_path / "x.mat", content) == expected
+
+
+def test_a_structure_of_units_beside_two_that_it_may_be_of_is_told(tmp_path: Path) -> None:
+    """One of them may hold what was converted."""
+    path = tmp_path / "x.mat"
+    savemat(path, {"raw": BOTH, "si": BOTH, "units": UNITS})
+    told: list[str] = []
+    assert all("[" not in name for name, _ in variables(str(path), told))
+    assert told == ["the structure of units is not read: raw and si have the channels that it names"]
+
+
+def test_units_of_matrices_stand_behind_the_numbers_of_columns(tmp_path: Path) -> None:
+    """They were within: `data.angle [deg].0`, which had been called `data.angle.0`."""
+    two = np.column_stack([ANGLE, 2 * ANGLE, 3 * ANGLE])
+    names = ["angle.0", "angle.1", "angle.2"]
+    for place, matrix in enumerate((two, two.T)):
+        beside = {"data": {"angle": matrix, "torque": TORQUE}, "units": UNITS}
+        expected = {f"data.{one}": "deg" for one in names} | {"data.torque": "Nmm"}
+        assert units_in(tmp_path / f"{place}.mat", beside) == expected
+        for content in ({"angle": matrix, "units": UNITS}, {"angle": {"data": matrix, "unit": "deg"}}):
+            assert units_in(tmp_path / f"{place}.mat", content) == dict.fromkeys(names, "deg")
+    found = tvident.read_recording(tmp_path / "1.mat")
+    np.testing.assert_array_equal(found["angle.2"], 3 * ANGLE)
 
 
 def test_headers_of_catman_say_names_and_units(tmp_path: Path) -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from tvident._arguments import is_called_time
 from tvident._formats.columns import COLUMNS
 from tvident._formats.matlab_tables import has_objects, tables
-from tvident._formats.told import cut, in_words
+from tvident._formats.told import Remark, cut, in_words
 
 
 def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
@@ -17,7 +18,7 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     rest = {
         name: value for name, value in _read(path, skipped).items() if name not in objects and name != "#subsystem#"
     }
-    yield from _flat("", rest)
+    yield from _flat("", rest, skipped)
     for variable, columns in objects.items():
         prefix = f"{variable}." if len(objects) > 1 or rest else ""
         yield from ((prefix + name, values) for name, values in columns.items())
@@ -73,7 +74,7 @@ def _names(path: str, error: Exception) -> list[str]:
 
 
 def _flat(
-    prefix: str, variables: Mapping[str, Any], beside: Mapping[str, Any] | None = None
+    prefix: str, variables: Mapping[str, Any], skipped: list[str], beside: Mapping[str, Any] | None = None
 ) -> Iterator[tuple[str, Any]]:
     """Give the leaves of nested structures with names joined by dots, and with units where structures, or one beside them, have these."""
     fields = {str(name): value for name, value in variables.items() if not str(name).startswith("__")}
@@ -83,24 +84,64 @@ def _flat(
         return
     fields = _by_column(_with_headers(fields))
     units: Mapping[str, Any] = next((fields[name] for name in _UNITS if isinstance(fields.get(name), Mapping)), {})
+    of_one, within = _of_structure_beside(fields, units, skipped)
+    said = {**(beside or {}), **units}
     for name, value in fields.items():
         if value is units and units:
             continue
         if not isinstance(value, Mapping):
-            yield _with_unit(f"{prefix}{name}", units.get(name, (beside or {}).get(name, ""))), value
+            yield from _channels(f"{prefix}{name}", said.get(name, ""), value)
             continue
-        several = _several_channels(value)
+        several = _several_channels(value, skipped)
         if several:
             yield from ((f"{prefix}{name}.{one}", samples) for one, samples in several)
             continue
         channel = _one_channel(value)
         if channel is None:
-            within = units.get(name, (beside or {}).get(name))
-            yield from _flat(f"{prefix}{name}.", value, within if isinstance(within, Mapping) else units or beside)
+            of_fields = said.get(name, within if name == of_one else None)
+            yield from _flat(f"{prefix}{name}.", value, skipped, of_fields if isinstance(of_fields, Mapping) else None)
             continue
         samples, unit, rest = channel
-        yield _with_unit(f"{prefix}{name}", unit), samples
-        yield from _flat(f"{prefix}{name}.", rest)
+        yield from _channels(f"{prefix}{name}", unit, samples)
+        yield from _flat(f"{prefix}{name}.", rest, skipped)
+
+
+def _of_structure_beside(
+    fields: Mapping[str, Any], units: Mapping[str, Any], skipped: list[str]
+) -> tuple[str, Mapping[str, Any]]:
+    """Return the structure beside one of units whose fields these name, and the units of them; none where it could be another.
+
+    Units of channels that lie beside them are of those: a structure may hold what was converted. Times may lie anywhere.
+    """
+    within = {name: unit for name, unit in units.items() if name not in fields}
+    recorded = [name for name in units if _has_samples(fields.get(name)) and not is_called_time(name)]
+    called = [
+        name
+        for name, value in fields.items()
+        if isinstance(value, Mapping) and value is not units and any(_has_samples(value.get(one)) for one in within)
+    ]
+    if recorded or not called:
+        return "", {}
+    if len(called) > 1:
+        several = " and ".join(map(cut, called[:2]))
+        skipped.append(Remark(f"the structure of units is not read: {several} have the channels that it names"))
+        return "", {}
+    return called[0], within
+
+
+def _has_samples(value: Any) -> bool:
+    return isinstance(value, Mapping) or getattr(value, "size", 1) > 1
+
+
+def _channels(name: str, unit: Any, samples: Any) -> Iterator[tuple[str, Any]]:
+    """Give samples by a name with their unit; the columns of a matrix one by one, as it stands behind their numbers."""
+    shape = [length for length in getattr(samples, "shape", ()) if length != 1]
+    if not _with_unit("", unit) or len(shape) != 2:  # noqa: PLR2004 - rows and columns
+        yield _with_unit(name, unit), samples
+        return
+    matrix = samples.reshape(shape)
+    columns = matrix.T if shape[0] >= shape[1] else matrix
+    yield from ((_with_unit(f"{name}.{place}", unit), column) for place, column in enumerate(columns))
 
 
 def _with_headers(fields: Mapping[str, Any]) -> dict[str, Any]:
@@ -113,9 +154,12 @@ def _with_headers(fields: Mapping[str, Any]) -> dict[str, Any]:
         lower = {str(key).lower(): value for key, value in header.items()}
         own = next((str(lower[key]).strip() for key in _NAMES if _is_word(lower.get(key))), name)
         unit = next((str(lower[key]).strip() for key in _UNITS if _is_word(lower.get(key))), "")
-        full = _with_unit(own if own == name or own not in used else f"{name}.{own}", unit)
+        full = own if own == name or own not in used else f"{name}.{own}"
         used.add(own)
-        found = {full if key == name else key: value for key, value in found.items()}
+        columns = dict(_channels(full, unit, samples))
+        found = {
+            one: value for key, old in found.items() for one, value in (columns if key == name else {key: old}).items()
+        }
     return found
 
 
@@ -175,7 +219,7 @@ def _one_channel(fields: Mapping[str, Any]) -> tuple[Any, str, Mapping[str, Any]
     return lower[values[0]], unit, rest
 
 
-def _several_channels(fields: Mapping[str, Any]) -> list[tuple[str, Any]]:
+def _several_channels(fields: Mapping[str, Any], skipped: list[str]) -> list[tuple[str, Any]]:
     """Return the channels of an array of structures, each with a name, samples and maybe a unit; none where it is something else."""
     lower = {str(name).lower(): value for name, value in fields.items() if str(name).lower() not in _SHAPES}
     values = [name for name in _VALUES if isinstance(lower.get(name), list)]
@@ -194,7 +238,7 @@ def _several_channels(fields: Mapping[str, Any]) -> list[tuple[str, Any]]:
         found.append((_with_unit(name if used[name] == 1 else f"{name}_{used[name]}", unit), one))
     read = {*values, *_NAMES, *_UNITS, *_SHAPES}
     others = {name: one for name, one in fields.items() if str(name).lower() not in read}
-    return [*found, *_flat("", others)]
+    return [*found, *_flat("", others, skipped)]
 
 
 def _is_word(value: Any) -> bool:
