@@ -52,3 +52,26 @@ def test_a_part_without_a_unit_is_not_in_that_of_the_others(tmp_path: Path) -> N
     found, skipped, remarks = read(tmp_path / "x.tdms", *parts[::-1])
     assert (found["angle"].unit, skipped) == ("deg", "")
     assert remarks == "channel angle: its unit, deg, was written at sample 300, and is taken for all of it"
+
+
+@pytest.mark.parametrize("unset", [{}, {"wf_start_time": np.datetime64("1904-01-01T00:00:00")}])
+def test_parts_whose_start_is_not_known_follow_the_part_before(tmp_path: Path, unset: Mapping[str, Any]) -> None:
+    """The second began at 0, as the first, so that times went back."""
+    later = [{"wf_start_time": START + np.timedelta64(ms, "ms")} for ms in (0, 11_200)]
+    parts: Any = [[("angle", ANGLE, more), ("torque", TORQUE, more)] for more in (unset, *later)]
+    found, _, remarks = read(tmp_path / "x.tdms", *parts)
+    np.testing.assert_allclose(found["time"], np.concatenate([T, 1.2 + T, 12.4 + T]), atol=1e-9)
+    assert remarks.count("it was appended to 10 s after its end") == 2
+    # The clock of the torque began with its first part.
+    parts[0][1] = ("torque", TORQUE, {"wf_start_time": START - np.timedelta64(1200, "ms")})
+    found, _, _ = read(tmp_path / "y.tdms", *parts)
+    np.testing.assert_allclose(found["time"], np.concatenate([T, 1.2 + T, 12.4 + T]), atol=1e-9)
+
+
+def test_a_part_that_lost_its_start_follows_the_one_before(tmp_path: Path) -> None:
+    """What is known of the others stays."""
+    unset = np.datetime64("1904-01-01T00:00:00")
+    starts = [START, unset, START + np.timedelta64(5000, "ms")]
+    found, _, remarks = read(tmp_path / "x.tdms", *[[("angle", ANGLE, {"wf_start_time": one})] for one in starts])
+    np.testing.assert_allclose(found["time"], np.concatenate([T, 1.2 + T, 5 + T]), atol=1e-9)
+    assert remarks == "channel angle: it was appended to 2.6 s after its end, as its times say"

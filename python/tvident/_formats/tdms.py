@@ -42,7 +42,8 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
         skipped.append("what was cut off at the end of the file (channels may have different lengths)")
     channels = [(one, parts_of(every, one)) for group in file.groups() for one in group.channels()]
     read = [(one, parts, _samples(one, parts, told, skipped)) for one, parts in channels]
-    starts = [start for _, parts, samples in read if samples is not None for _, start, _ in _begins(parts) if start]
+    # What begins later says nothing of when the first part began, if that does not.
+    starts = [start for _, parts, samples in read if samples is not None for _, start, _ in _begins(parts)[:1] if start]
     starts += [
         samples[0] for _, _, samples in read if samples is not None and samples.dtype.kind == "M" and samples.size
     ]
@@ -170,24 +171,44 @@ def _times(
     second = 1 / factor_between(axis[1], "s", name="time")
 
     def moved_to(start: Any) -> float:
-        moved = 0.0 if start is None else second * float((start - min(starts)) / np.timedelta64(1, "s"))
-        return moved if moved > _SAME_START * period else 0.0
+        if start is None:
+            return 0.0
+        zero = min(starts or [one for _, one, _ in begun if one is not None])
+        moved = second * float((start - zero) / np.timedelta64(1, "s"))
+        return moved if abs(moved) > _SAME_START * period else 0.0
 
-    before, start, offset = begun[0]
-    moved = moved_to(start) + offset
-    time += moved - offset
-    for first, start, offset in begun[1:]:
-        begin = moved_to(start) + offset
-        pause = begin - moved - period * (first - before)
-        if abs(pause) > _GOES_ON * period:
-            time[first:] += pause
-            skipped.append(
-                Remark(
-                    f"channel {cut(channel.name)}: it was appended to {pause / second:.6g} s after its end, as its times say"
-                )
-            )
-            before, moved = first, begin
+    begins = [(first, start is not None, moved_to(start) + offset) for first, start, offset in begun]
+    skipped += [
+        Remark(
+            f"channel {cut(channel.name)}: it was appended to {pause / second:.6g} s after its end, as its times say"
+        )
+        for pause in _pauses(time, begins, _GOES_ON * period, has_zero=bool(starts))
+    ]
     return time, axis
+
+
+def _pauses(time: Any, begins: Sequence[tuple[int, bool, float]], near: float, *, has_zero: bool) -> Iterator[float]:
+    """Move the times of every part to where it begins, and give the pauses before those that do not go on.
+
+    Parts are their first sample, whether their start is known, and the time at which they begin. Those whose start is not known begin by
+    their offsets, and nothing says what lies between them and others.
+    """
+    first, was_known, begin = begins[0]
+    time += begin - time[0]
+    placed = {was_known: (begin, begin)}
+    for first, is_known, begin in begins[1:]:
+        usual, pause = float(time[first]), 0.0
+        if is_known in placed and (is_known or not was_known):
+            there, then = placed[is_known]
+            pause = there + begin - then - usual
+        elif is_known and has_zero:
+            pause = max(begin - usual, 0.0)
+        if abs(pause) > near:
+            time[first:] += pause
+            yield pause
+        if abs(pause) > near or is_known not in placed or (was_known and not is_known):
+            placed[is_known] = (float(time[first]), begin)
+        was_known = is_known
 
 
 def _has_start(properties: Mapping[str, Any]) -> bool:
