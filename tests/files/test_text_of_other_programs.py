@@ -229,6 +229,60 @@ def test_scopes_of_twincat_say_before_each_pair_what_a_line_holds(tmp_path: Path
     assert any("the first row holds nothing" in str(one.message) for one in said) == has_blank
 
 
+def of_pairs(path: Path, head: list[str]) -> dict[str, str]:
+    """Write lines above pairs of times and samples, and return the units of the columns."""
+    pairs = max(line.count("\t") + 1 for line in head) // 2
+    path.write_text("\n".join([*head, *("\t".join([f"{k}", f"{k / 7:.5f}"] * pairs) for k in range(50))]) + "\n")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", recordings.FileWarning)
+        return {name: values.unit for name, values in tvident.read_recording(path).items()}
+
+
+SCOPE = ["Name\tPos", "Data-Type\tREAL64", "SampleTime[ms]\t1", "Unit\tdeg"]
+
+
+@pytest.mark.parametrize(
+    ("head", "expected"),
+    [
+        (SCOPE, {"time": "ms", "Pos": "deg"}),
+        (["Name\tRig", "File\tx", *SCOPE, "ScaleFactor\t1"], {"time": "ms", "Pos": "deg"}),
+        (SCOPE[:3], {"time": "ms", "Pos": ""}),
+        ([f"{line}\t{line}" for line in SCOPE[:3]], {"time": "ms", "Pos": "", "time_2": "ms", "Pos_2": ""}),
+        (
+            ["Name\tPos\tName\tTrq", "SampleTime[ms]\t1\tSampleTime[us]\t9", "Unit\tdeg\tUnit\tNm"],
+            {"time [ms]": "ms", "Pos": "deg", "time [us]": "us", "Trq": "Nm"},
+        ),
+    ],
+)
+def test_scopes_of_twincat_with_one_channel_without_units_or_with_two_rates(
+    tmp_path: Path, head: list[str], expected: dict[str, str]
+) -> None:
+    assert of_pairs(tmp_path / "scope.csv", head) == expected
+
+
+@pytest.mark.parametrize(
+    ("head", "expected"),
+    [
+        (
+            ["Name\tRotor\tName\tMotor", "time [s]\tangle [deg]\ttime [s]\ttorque [Nmm]"],
+            {"Name.time": "s", "Rotor.angle": "deg", "Name.time_2": "s", "Motor.torque": "Nmm"},
+        ),
+        (["name\tleft\tname\tright"], dict.fromkeys(["name", "left", "name_2", "right"], "")),
+        (["Name\tPos", "Unit\tdeg"], {"Name": "", "Pos": "deg"}),
+        # Below what a scope says names are nearer.
+        (
+            [f"{line}\t{line}" for line in SCOPE] + ["t\tangle [rad]\tt\ttorque [Nmm]"],
+            {"t": "ms", "angle": "rad", "t_2": "ms", "torque": "Nmm"},
+        ),
+    ],
+)
+def test_other_lines_that_begin_pairs_with_one_word_are_of_no_scope(
+    tmp_path: Path, head: list[str], expected: dict[str, str]
+) -> None:
+    """Names and units below such a line were lost, without a word."""
+    assert of_pairs(tmp_path / "x.tsv", head) == expected
+
+
 @pytest.mark.parametrize("separator", ["\t", ";", ","])
 def test_separators_alone_below_the_names_are_no_sample(tmp_path: Path, separator: str) -> None:
     """They were a first sample in which nothing was measured, and all others came later."""

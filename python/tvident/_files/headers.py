@@ -33,6 +33,22 @@ _KEY = re.compile(r"[A-Za-z][A-Za-z ]*=")
 _MARK = re.compile(r"\s*(?:#+|[%!]+(?=[\s\w\"])|//+)\s*")
 """What other programs begin a line with that holds no numbers."""
 
+_OF_SCOPE = (
+    "data-type",
+    "sampletime[",
+    "variablesize",
+    "symbolbased",
+    "symbolname",
+    "unit",
+    "unit-scalefactor",
+    "offset",
+    "scalefactor",
+)
+"""What a scope of TwinCAT says of every channel, below its name."""
+
+_OF_PROJECT = re.compile(r"name|file|(start|end) ?time of export", re.IGNORECASE)
+"""What it says of all, above."""
+
 _UNITS_KEY = re.compile(r"(units?|einheit(en)?|unit[ée]s?|unidad(es)?)[. ]*[:=]?", re.IGNORECASE)
 """What may stand before units, in place of one."""
 
@@ -314,22 +330,34 @@ def _without_keys(above: Sequence[Line], most: int) -> list[Line]:
 
 
 def _without_repeated_keys(above: Sequence[Line], most: int) -> list[Line]:
-    """Return lines above pairs of times and samples, which begin every pair with what they say of it, as scopes of TwinCAT write them."""
-    keyed = {line.cells[0].casefold(): line for line in above if _is_keyed_in_pairs(line, most)}
-    names, units = keyed.get("name"), keyed.get("unit")
-    if names is None:
+    """Return lines above pairs of times and samples, which begin every pair with what they say of it, as scopes of TwinCAT write them.
+
+    Nothing else has a name, a sample time with its unit, and a unit or a type, of every pair.
+    """
+    keys = {line: _key_of_pairs(line, most) for line in above}
+    keyed = {key: line for line, key in keys.items()}
+    names, rates, units = keyed.get("name"), keyed.get("sampletime["), keyed.get("unit")
+    if names is None or rates is None or (units is None and "data-type" not in keyed):
         return list(above)
-    unit = next((named_unit(line.cells[0])[1] for key, line in keyed.items() if key.startswith("sampletime[")), "")
-    for line, of_times in ((names, "time"), (units, unit)):
+    last = max(keyed[key].place for key in _OF_SCOPE if key in keyed)
+    of_times = [named_unit(cell)[1] for cell in rates.cells[::2]]
+    times = ["time" if units is not None else with_unit("time", unit) for unit in of_times]
+    for line, of_pairs in ((names, times), (units, of_times)):
         if line is not None:
             cells = [*line.cells, *[""] * (most - len(line.cells))]
-            line.cells = [cell if place % 2 else of_times for place, cell in enumerate(cells)]
-    return [line for line in above if line in {names, units}]
+            line.cells = [cell if place % 2 else of_pairs[place // 2] for place, cell in enumerate(cells)]
+    dropped = {line for line in above if keys[line] and names.place < line.place <= last}
+    dropped |= {
+        line for line in above if line.cells and line.place < names.place and _OF_PROJECT.fullmatch(line.cells[0])
+    }
+    return [line for line in above if line in {names, units} or line not in dropped]
 
 
-def _is_keyed_in_pairs(line: Line, most: int) -> bool:
+def _key_of_pairs(line: Line, most: int) -> str:
+    """Return what a line begins every pair of cells with, up to a bracket; nothing where it does not."""
     keys = line.cells[::2]
-    return most > 2 and most % 2 == 0 and len(keys) == most // 2 and len(set(keys)) == 1 and bool(keys[0])  # noqa: PLR2004 - pairs
+    begun = {"".join(key.partition("[")[:2]).casefold() for key in keys}
+    return begun.pop() if most % 2 == 0 and len(keys) == most // 2 and len(begun) == 1 else ""
 
 
 def _share_of_units(cells: Sequence[str]) -> float:
