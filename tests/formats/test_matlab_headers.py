@@ -104,6 +104,9 @@ def test_units_of_matrices_stand_behind_the_numbers_of_columns(tmp_path: Path) -
         assert units_in(tmp_path / f"{place}.mat", beside) == expected
         for content in ({"angle": matrix, "units": UNITS}, {"angle": {"data": matrix, "unit": "deg"}}):
             assert units_in(tmp_path / f"{place}.mat", content) == dict.fromkeys(names, "deg")
+    several = np.array([(two, "angle", "deg"), (two, "torque", "Nm")], [("data", "O"), ("name", "O"), ("unit", "O")])
+    units = units_in(tmp_path / "2.mat", {"rig": several})
+    assert units == {f"rig.{one}.{k}": unit for one, unit in (("angle", "deg"), ("torque", "Nm")) for k in range(3)}
     found = tvident.read_recording(tmp_path / "1.mat")
     np.testing.assert_array_equal(found["angle.2"], 3 * ANGLE)
 
@@ -117,6 +120,27 @@ def test_headers_of_catman_say_names_and_units(tmp_path: Path) -> None:
     content: dict[str, Any] = {"File_Header": {"NumberOfChannels": "2"}}
     for place, (header, samples) in enumerate(zip(headers, (ANGLE, TORQUE), strict=True), 1):
         content |= {f"Channel_{place}_Data": samples[:, np.newaxis], f"Channel_{place}_Header": header}
-    assert units_in(tmp_path / "x.mat", content) == {"travel": "mm", "load": "kN"}
+    assert units_in(tmp_path / "x.mat", content) == {"Channel_1_Data.travel": "mm", "Channel_2_Data.load": "kN"}
+    found = tvident.read_recording(tmp_path / "x.mat")
+    for place, (name, unit, samples) in enumerate((("travel", "mm", ANGLE), ("load", "kN", TORQUE)), 1):
+        for called in (name, f"Channel_{place}_Data", f"Channel_{place}_Data.{name}"):
+            assert found[called].unit == unit
+            np.testing.assert_array_equal(found[called], samples)
     twice = {**content, "Channel_2_Header": headers[0], "other": TORQUE}
-    assert units_in(tmp_path / "y.mat", twice) == {"travel": "mm", "Channel_2_Data.travel": "mm", "other": ""}
+    expected = {"Channel_1_Data.travel": "mm", "Channel_2_Data.travel": "mm", "other": ""}
+    assert units_in(tmp_path / "y.mat", twice) == expected
+    with pytest.raises(KeyError, match="one channel 'travel'"):
+        tvident.read_recording(tmp_path / "y.mat")["travel"]
+
+
+def test_columns_below_a_header_of_catman_are_found_as_without(tmp_path: Path) -> None:
+    """They were `travel [deg].0`."""
+    header = {"Unit": "deg", "SignalName": "travel"}
+    matrix = np.column_stack([ANGLE, TORQUE])
+    units = units_in(tmp_path / "x.mat", {"Channel_1_Data": matrix, "Channel_1_Header": header})
+    assert units == {"Channel_1_Data.travel.0": "deg", "Channel_1_Data.travel.1": "deg"}
+    found = tvident.read_recording(tmp_path / "x.mat")
+    for called in ("Channel_1_Data.1", "travel.1", "Channel_1_Data/1"):
+        np.testing.assert_array_equal(found[called], TORQUE)
+    with pytest.raises(KeyError, match="one channel 'Channel_1_Data'"):
+        found["Channel_1_Data"]

@@ -39,6 +39,9 @@ Say = Callable[[str], None]
 
 _NUMBER = re.compile(r"[0-9]{1,9}")
 
+_SAMPLES = re.compile(r"(.+_Data)((?:\.[0-9]+)?)")
+"""What catman calls samples, or a column of them: what the header calls them stands between."""
+
 
 class FileError(Exception):
     """A file that cannot be used. The message says why and what to do.
@@ -151,6 +154,7 @@ def full_name(channels: Mapping[str, Any], name: str, source: str) -> str:
     if len(same) == 1:
         return same[0]
     inside = [key for key in channels if named_unit(key)[0].endswith(f".{name}") or key.endswith(f".{name}")]
+    inside = inside or _behind_samples(channels, name)
     if not same and len(inside) == 1 and not _NUMBER.fullmatch(name):
         return inside[0]
     if not same and not inside:
@@ -173,3 +177,10 @@ def full_name(channels: Mapping[str, Any], name: str, source: str) -> str:
     if _NUMBER.fullmatch(name) and int(name) < len(channels):
         return list(channels)[int(name)]
     raise KeyError(f"{place} has no channel '{asked}'; it has {listed(channels)}; use one of these or a number from 0")
+
+
+def _behind_samples(channels: Mapping[str, Any], name: str) -> list[str]:
+    """Return the channels that a header names behind this name."""
+    found = _SAMPLES.fullmatch(name)
+    begun = [key for key in channels if found and key.startswith(f"{found[1]}.")]
+    return [key for key in begun if found and named_unit(key)[0].endswith(found[2])]

@@ -145,21 +145,17 @@ def _channels(name: str, unit: Any, samples: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _with_headers(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Return variables with those named and in the unit that a header beside them says: ``Channel_1_Data``, ``Channel_1_Header``."""
-    found, used = dict(fields), set(fields)
+    """Return variables with what a header beside them says behind their names: ``Channel_1_Data.travel [mm]``, of ``Channel_1_Header``."""
+    found: dict[str, Any] = {}
     for name, samples in fields.items():
         header = fields.get(f"{name[: -len(_DATA)]}{_HEADER}") if name.endswith(_DATA) else None
         if not isinstance(header, Mapping) or isinstance(samples, Mapping):
+            found[name] = samples
             continue
         lower = {str(key).lower(): value for key, value in header.items()}
         own = next((str(lower[key]).strip() for key in _NAMES if _is_word(lower.get(key))), name)
         unit = next((str(lower[key]).strip() for key in _UNITS if _is_word(lower.get(key))), "")
-        full = own if own == name or own not in used else f"{name}.{own}"
-        used.add(own)
-        columns = dict(_channels(full, unit, samples))
-        found = {
-            one: value for key, old in found.items() for one, value in (columns if key == name else {key: old}).items()
-        }
+        found |= _channels(name if own == name else f"{name}.{own}", unit, samples)
     return found
 
 
@@ -232,10 +228,10 @@ def _several_channels(fields: Mapping[str, Any], skipped: list[str]) -> list[tup
     if not all(names) or len(units) != len(samples):
         return []
     used: dict[str, int] = {}
-    found = []
+    found: list[tuple[str, Any]] = []
     for name, unit, one in zip(names, units, samples, strict=True):
         used[name] = used.get(name, 0) + 1
-        found.append((_with_unit(name if used[name] == 1 else f"{name}_{used[name]}", unit), one))
+        found += _channels(name if used[name] == 1 else f"{name}_{used[name]}", unit, one)
     read = {*values, *_NAMES, *_UNITS, *_SHAPES}
     others = {name: one for name, one in fields.items() if str(name).lower() not in read}
     return [*found, *_flat("", others, skipped)]
