@@ -265,17 +265,19 @@ pub(crate) fn find(
     Ok(found)
 }
 
-/// What slow coefficients would follow of another right-hand side with the bandwidth that was found, or `None` if they are not determined.
+/// What slow coefficients would follow of another right-hand side with the bandwidth that was found, or `None` if they are not determined: as much more of
+/// one that is as much larger, whatever noise is expected.
 pub(crate) fn followed(
     search: &SlowSearch<'_>,
     found: &SlowCoefficients,
     rhs: &[f64],
     stages: &mut Stages<'_, '_>,
 ) -> Result<Option<Varying>, Error> {
-    let &SlowSearch { rows, model, coefficients, noise, expected, instructions, .. } = search;
+    let &SlowSearch { rows, model, coefficients, noise, instructions, .. } = search;
     let scale = found.equations_of;
-    let problem = model.problem(rows, rhs, noise, None);
-    let Some(fit) = Fit::new(&problem, Some(scale), expected, instructions, stages)? else { return Ok(None) };
+    let problem = model.problem_of_another(rows, rhs, noise);
+    let fit = Fit::new(&problem, Some(scale), Expected::UNKNOWN, instructions, stages)?;
+    let Some(fit) = fit else { return Ok(None) };
     let companions =
         model.constant[..coefficients].iter().map(|&one| rows.regressors[one].companion.as_slice()).collect();
     let weights = vec![1.0; fit.full.len()];

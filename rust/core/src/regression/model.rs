@@ -76,6 +76,12 @@ impl Model {
         }
     }
 
+    /// The problem of another right-hand side than that of the rows: what is taken off theirs, and the noise that comes with it, is none of its own.
+    pub(crate) fn problem_of_another<'a>(&self, rows: &'a Rows, rhs: &'a [f64], noise: f64) -> Problem<'a> {
+        let noise = self.row_noise(rows, &[], noise);
+        Problem { noise, ..self.problem(rows, rhs, 0.0, None) }
+    }
+
     /// The problem that remains once the constants are known: the same windows with fewer columns and the same numbers.
     pub(crate) fn without_constants<'a>(
         &self,
