@@ -19,6 +19,7 @@ OTHERS = {
     "_identify/aligned.py": "an offset of clocks",
     "_identify/own_clocks.py": "an offset of clocks",
     "_commands/identification.py": "an offset of clocks",
+    "_files/headers.py": "what a scope calls the zero of a channel",
 }
 """Files that name a term, or mean something else by the word."""
 
