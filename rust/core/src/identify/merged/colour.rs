@@ -8,6 +8,8 @@ use crate::weak_form::test_function::Kernels;
 
 /// Times by which a first-order noise is forgotten: a twentieth of it is left.
 const FORGOTTEN: f64 = 3.0;
+/// Lengths of a kernel after which noise counts as forgotten at the latest.
+const LONGEST: f64 = 3.0;
 /// What is added to the diagonal of products, each column scaled to one, so that rounding leaves a factor.
 const ROUNDING: f64 = 1e-13;
 
@@ -21,8 +23,17 @@ pub(crate) fn noisy(noise: &CorrelatedNoise, kernel: &[f64]) -> (f64, Vec<f64>) 
 /// Samples after which noise is forgotten, at most three times the length of a kernel.
 pub(crate) fn memory(noise: &CorrelatedNoise, length: usize) -> usize {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few kernels at most")]
-    let samples = (FORGOTTEN * noise.memory()).min(3.0 * length as f64).ceil() as usize;
+    let samples = (FORGOTTEN * noise.memory()).min(LONGEST * length as f64).ceil() as usize;
     samples
+}
+
+/// What is taken of a covariance at a distance in samples, where it counts up to some: all of it, but less and less with the distance where noise is
+/// remembered for longer. A covariance that ends at once is none: variances of what many rows say would be negative.
+pub(crate) fn taper(noise: &CorrelatedNoise, length: usize, distance: usize) -> f64 {
+    if FORGOTTEN * noise.memory() <= LONGEST * length as f64 {
+        return 1.0;
+    }
+    1.0 - (distance as f64 / (length + memory(noise, length)) as f64).min(1.0)
 }
 
 /// Columns as long as the kernels whose products are those of the kernels with coloured noise between: values first, then slopes.
@@ -67,6 +78,28 @@ mod tests {
                 assert!((dot(column, with) - exact).abs() < 1e-9 * size, "{exact}");
             }
         }
+    }
+
+    #[test]
+    fn covariances_that_are_cut_stay_those_of_a_noise() {
+        // Noise of density 1/f, about: sums of what many rows say would have negative variances without a taper.
+        let first_order = (1..12).map(|octave| (1.0 - 0.5_f64.powi(octave), 1.0)).collect();
+        let noise = CorrelatedNoise::new(0.1, first_order);
+        let kernel = &TestFunction::new(16, 5, 1e-3).expect("a test function").kernels(0.0).values[2];
+        let (variance, noisy) = noisy(&noise, kernel);
+        let covariance = |lag: usize| {
+            let products = kernel.iter().zip(noisy.get(lag..).unwrap_or_default()).map(|(a, b)| a * b);
+            variance * products.sum::<f64>()
+        };
+        let least = |tapered: bool| {
+            let of = |lag: usize| if tapered { taper(&noise, kernel.len(), lag) } else { 1.0 } * covariance(lag);
+            let density = |frequency: f64| {
+                (1..noisy.len()).map(|lag| 2.0 * of(lag) * (frequency * lag as f64).cos()).sum::<f64>() + of(0)
+            };
+            (0..200).map(|place| density(std::f64::consts::PI * f64::from(place) / 200.0)).fold(f64::INFINITY, f64::min)
+        };
+        assert!(least(false) < -1e-3 * covariance(0));
+        assert!(least(true) > -1e-9 * covariance(0), "{}", least(true));
     }
 
     #[test]

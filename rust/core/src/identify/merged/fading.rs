@@ -48,8 +48,36 @@ pub(crate) fn colours_of(session: &mut MergedSession<'_, '_, '_>) -> Result<[Vec
 }
 
 impl MergedSession<'_, '_, '_> {
+    /// A fit beside noise of torques that has as much of the colour that their channels show as is left of their equations; `None` where none has any, or
+    /// where what changes is lost beside it: with less to tell by, a constant that differs between parts of the record may stay one.
+    pub(crate) fn with_colour_of_torques(
+        &mut self,
+        fitted: &MergedFit,
+        shown: &[CorrelatedNoise],
+    ) -> Result<Option<MergedFit>, Error> {
+        let white = self.colours[1].clone();
+        let before = (self.parameters.clone(), self.misfits.clone(), self.freed.clone());
+        let rest = (self.jumps.clone(), self.scan.clone(), self.at_end, self.is_decided, self.all.function);
+        if !self.colour_torques(fitted, shown)? {
+            return Ok(None);
+        }
+        // What was set free may have followed noise.
+        self.freed.clear();
+        let found = self.chosen_and_settled()?;
+        if let Some(found) = found.filter(|found| fitted.contradicted || !found.contradicted) {
+            return Ok(Some(found));
+        }
+        self.colours[1] = white;
+        (self.parameters, self.misfits, self.freed) = before;
+        let function;
+        (self.jumps, self.scan, self.at_end, self.is_decided, function) = rest;
+        self.build(function)?;
+        self.fill();
+        Ok(None)
+    }
+
     /// Gives the noise of torques as much of the colour that their channels show as is left of their equations. Returns whether any has it.
-    pub(crate) fn colour_torques(&mut self, fitted: &MergedFit, shown: &[CorrelatedNoise]) -> Result<bool, Error> {
+    fn colour_torques(&mut self, fitted: &MergedFit, shown: &[CorrelatedNoise]) -> Result<bool, Error> {
         if shown.iter().all(CorrelatedNoise::is_white) || fitted.misfit > NOISE_MODEL_FAILS {
             return Ok(false);
         }

@@ -69,10 +69,7 @@ fn identify_within(
     let white = session.noise[1].iter().map(|&variance| CorrelatedNoise::white(variance)).collect();
     session.colours = [angles, white];
     let Some(mut fitted) = session.chosen_and_settled()? else { return session.nothing() };
-    if session.colour_torques(&fitted, &torques)? {
-        // What was set free may have followed noise.
-        session.freed.clear();
-        let Some(again) = session.chosen_and_settled()? else { return session.nothing() };
+    if let Some(again) = session.with_colour_of_torques(&fitted, &torques)? {
         fitted = again;
     }
     for _ in 0..FADINGS {

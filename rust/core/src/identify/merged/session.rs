@@ -4,7 +4,7 @@ use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::exec::stages::Stages;
 use crate::identify::kinds::Kind;
-use crate::identify::merged::colour::{memory, noisy};
+use crate::identify::merged::colour::{memory, noisy, taper};
 use crate::identify::merged::interleaved::{Channels, Interleaved, Weights};
 use crate::identify::merged::system::{Entry, Merged, MergedOptions, Multiplied};
 use crate::identify::scanned::Scan;
@@ -240,7 +240,8 @@ impl MergedSession<'_, '_, '_> {
                 })
                 .sum::<f64>();
             let (factor, noisy) = &of_torques[one];
-            let of_torque = if one == other { factor * products(torque, noisy, times * stride) } else { 0.0 };
+            let taper = taper(&self.colours[1][one], torque.len(), times * stride);
+            let of_torque = if one == other { taper * factor * products(torque, noisy, times * stride) } else { 0.0 };
             weights[one] * weights[other] * (from_angles + of_torque)
         };
         let memory = self.colours.iter().flatten().map(|noise| memory(noise, torque.len())).max().unwrap_or(0);
