@@ -92,6 +92,8 @@ def worst(found: Any, one: Record) -> float:
 
 CASES = [
     ("quadratic_drag", 0.01, 2, 1),
+    # Too little for a first look: 3.2 errors off, without a word.
+    ("coulomb", 0.002, 2, 1),
     *long(("quadratic_drag", 0.02, 2, 0), ("coulomb", 0.005, 2, 1), ("coulomb", 0.01, 2, 0), ("cubic", 30.0, 2, 1)),
 ]
 

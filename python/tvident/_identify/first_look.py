@@ -24,10 +24,12 @@ class FirstLook:
     left : callable
         Takes names and returns the mean square of what equations with these terms leave; infinite where that is not known, or
         where one of them cannot be what it is called.
+    worth : float
+        The part of what is left before that is left at most of what is seen.
     """
 
-    def __init__(self, left: Callable[[Names], float]) -> None:
-        self._left = cache(left)
+    def __init__(self, left: Callable[[Names], float], worth: float = WORTH) -> None:
+        self._left, self._worth = cache(left), worth
 
     @property
     def tells(self) -> bool:
@@ -38,7 +40,7 @@ class FirstLook:
         """Return those that explain a part of what is left beside others, the most first."""
         before = self._left(beside)
         left = {one: self._left((*beside, one)) for one in names if one not in beside}
-        return sorted((one for one in left if left[one] <= WORTH * before < np.inf), key=left.__getitem__)
+        return sorted((one for one in left if left[one] <= self._worth * before < np.inf), key=left.__getitem__)
 
     def together(self, names: Sequence[str]) -> Names:
         """Return those that explain a part each beside the others before them."""
