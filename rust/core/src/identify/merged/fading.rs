@@ -55,12 +55,9 @@ impl MergedSession<'_, '_, '_> {
         fitted: &MergedFit,
         shown: &[CorrelatedNoise],
     ) -> Result<Option<MergedFit>, Error> {
-        let white = self.colours[1].clone();
-        let before = (self.parameters.clone(), self.misfits.clone(), self.freed.clone());
-        let rest = (self.jumps.clone(), self.scan.clone(), self.at_end, self.is_decided, self.all.function);
-        if !self.colour_torques(fitted, shown)? {
-            return Ok(None);
-        }
+        let Some(colours) = self.borne_out(fitted, shown)? else { return Ok(None) };
+        let before = self.state();
+        let white = std::mem::replace(&mut self.colours[1], colours);
         // What was set free may have followed noise.
         self.freed.clear();
         let found = self.chosen_and_settled()?;
@@ -68,33 +65,32 @@ impl MergedSession<'_, '_, '_> {
             return Ok(Some(found));
         }
         self.colours[1] = white;
-        (self.parameters, self.misfits, self.freed) = before;
-        let function;
-        (self.jumps, self.scan, self.at_end, self.is_decided, function) = rest;
-        self.build(function)?;
-        self.fill();
+        self.restore(before)?;
         Ok(None)
     }
 
-    /// Gives the noise of torques as much of the colour that their channels show as is left of their equations. Returns whether any has it.
-    fn colour_torques(&mut self, fitted: &MergedFit, shown: &[CorrelatedNoise]) -> Result<bool, Error> {
+    /// As much of the colour that the channels of torques show as is left of their equations; `None` where it is none of any.
+    fn borne_out(
+        &mut self,
+        fitted: &MergedFit,
+        shown: &[CorrelatedNoise],
+    ) -> Result<Option<Vec<CorrelatedNoise>>, Error> {
         if shown.iter().all(CorrelatedNoise::is_white) || fitted.misfit > NOISE_MODEL_FAILS {
-            return Ok(false);
+            return Ok(None);
         }
         let left = self.left_of_equations(&fitted.model, &fitted.fit)?;
+        let of_white = self.noise_of_equations();
         let white = std::mem::replace(&mut self.colours[1], shown.to_vec());
-        let [of_white, of_shown] = [&white, &shown.to_vec()].map(|colours| {
-            self.colours[1].clone_from(colours);
-            self.noise_of_equations()
-        });
-        let mut has_colour = false;
-        for (equation, white) in white.into_iter().enumerate() {
+        let of_shown = self.noise_of_equations();
+        self.colours[1].clone_from(&white);
+        let of = |(equation, white): (usize, CorrelatedNoise)| {
             let part = left[equation] * of_white[equation] / of_shown[equation];
             let is_borne_out = !shown[equation].is_white() && part >= BORNE_OUT;
-            self.colours[1][equation] = if is_borne_out { shown[equation].with_part(part.min(1.0)) } else { white };
-            has_colour |= is_borne_out;
-        }
-        Ok(has_colour)
+            if is_borne_out { shown[equation].with_part(part.min(1.0)) } else { white }
+        };
+        let colours: Vec<CorrelatedNoise> = white.into_iter().enumerate().map(of).collect();
+        let has_colour = !colours.iter().all(CorrelatedNoise::is_white);
+        Ok(has_colour.then_some(colours))
     }
 
     /// Takes less of the colour of the angles' noise where equations leave less than it makes: where noise is strong, slow motion is taken for

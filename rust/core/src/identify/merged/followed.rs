@@ -37,8 +37,8 @@ impl MergedSession<'_, '_, '_> {
             if half_width < LEAST_HALF_WIDTH {
                 break;
             }
-            let before = (self.parameters.clone(), self.misfits.clone(), std::mem::take(&mut self.jumps), self.at_end);
-            let decided = (self.scan.clone(), self.freed.clone(), self.is_decided);
+            let before = self.state();
+            self.jumps.clear();
             self.build(TestFunction::new(half_width, function.exponent(), self.options.delta)?)?;
             self.pilot()?;
             let mut again = self.settle(&self.model())?;
@@ -54,10 +54,7 @@ impl MergedSession<'_, '_, '_> {
                 again = is_better.then_some(tried);
             }
             let Some(again) = again else {
-                self.build(function)?;
-                (self.parameters, self.misfits, self.jumps, self.at_end) = before;
-                (self.scan, self.freed, self.is_decided) = decided;
-                self.fill();
+                self.restore(before)?;
                 break;
             };
             (fitted, self.at_end) = (again, self.all.function.half_width() == LEAST_HALF_WIDTH);

@@ -60,7 +60,43 @@ pub(crate) struct MergedSession<'a, 'b, 'c> {
     pub(crate) stages: Stages<'b, 'c>,
 }
 
+/// What was chosen and decided of merged rows, to come back to where another choice proves no better.
+pub(crate) struct SessionState {
+    parameters: Vec<f64>,
+    misfits: Vec<f64>,
+    freed: Vec<usize>,
+    jumps: Vec<Jump>,
+    scan: Scan,
+    at_end: bool,
+    is_decided: bool,
+    function: TestFunction,
+}
+
 impl MergedSession<'_, '_, '_> {
+    /// What was chosen and decided so far.
+    pub(crate) fn state(&self) -> SessionState {
+        SessionState {
+            parameters: self.parameters.clone(),
+            misfits: self.misfits.clone(),
+            freed: self.freed.clone(),
+            jumps: self.jumps.clone(),
+            scan: self.scan.clone(),
+            at_end: self.at_end,
+            is_decided: self.is_decided,
+            function: self.all.function,
+        }
+    }
+
+    /// Comes back to what was chosen and decided, with the rows that belong to it.
+    pub(crate) fn restore(&mut self, state: SessionState) -> Result<(), Error> {
+        let SessionState { parameters, misfits, freed, jumps, scan, at_end, is_decided, function } = state;
+        self.build(function)?;
+        (self.parameters, self.misfits, self.freed, self.jumps) = (parameters, misfits, freed, jumps);
+        (self.scan, self.at_end, self.is_decided) = (scan, at_end, is_decided);
+        self.fill();
+        Ok(())
+    }
+
     /// What is windowed and what is constant, as asked or as it had to be.
     pub(crate) fn model(&self) -> Model {
         let unknowns = self.merged.unknowns();
