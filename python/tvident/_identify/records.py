@@ -11,14 +11,14 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident._equation import COEFFICIENTS, Term
 from tvident._identify.earlier import with_earlier_kinds
-from tvident._identify.short_records import without_numbers
+from tvident._identify.short_records import CHANNELS, OF_SAMPLES, without_numbers
 from tvident._results import Identification, IdentifiedRecords, Shared, covariance_between, with_shared
 from tvident._status import Status
 
 Array = npt.NDArray[np.float64]
 Single = Callable[..., Identification]
 
-_CHANNELS = ("angle", "velocity", "acceleration", "torque", "instrument", "mask", "weights", "t")
+_CHANNELS = (*CHANNELS, *OF_SAMPLES)
 """Arguments that have a value for every sample, and so one array a record."""
 
 _OTHERS = ("sample_rate", "delta", "lag", "inertia", "damping", "stiffness", "settings")

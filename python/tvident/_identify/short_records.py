@@ -16,10 +16,10 @@ _OF_LENGTH = ("a record must hold at least", "the length of the record", "must n
 _TOO_SHORT = 2
 """Samples of which nothing is known, whatever is said of them."""
 
-_CHANNELS = ("angle", "velocity", "acceleration", "torque", "instrument")
+CHANNELS = ("angle", "velocity", "acceleration", "torque", "instrument")
 """Arguments that are missing where a record is too short."""
 
-_OF_SAMPLES = ("mask", "weights", "t")
+OF_SAMPLES = ("mask", "weights", "t")
 """Others that have a value for every sample."""
 
 
@@ -44,8 +44,8 @@ def without_numbers(
     is_short = size <= _TOO_SHORT or any(words in str(error) for words in _OF_LENGTH)
     if size >= max(sizes) or not is_short or not _are_of_one_length(calls[place], size):
         return None
-    missing = {name: _missing(longest[name]) for name in _CHANNELS}
-    others = {name: longest[name] for name in _OF_SAMPLES}
+    missing = {name: _missing(longest[name]) for name in CHANNELS}
+    others = {name: longest[name] for name in OF_SAMPLES}
     known = {name: longest[name] for name in COEFFICIENTS if np.ndim(longest[name]) > 0}
     found = single(**{**calls[place], **missing, **others, **known, "progress": None})
     count = len(range(0, size, int(calls[place]["step"])))
@@ -61,7 +61,7 @@ def _missing(channel: Any) -> Any:
 
 def _samples(call: Mapping[str, Any]) -> int:
     """Return how many samples of the motion a record has."""
-    return next(int(np.size(call[name])) for name in _CHANNELS if call[name] is not None)
+    return next(int(np.size(call[name])) for name in CHANNELS if call[name] is not None)
 
 
 def _are_of_one_length(call: Mapping[str, Any], size: int) -> bool:
@@ -69,7 +69,7 @@ def _are_of_one_length(call: Mapping[str, Any], size: int) -> bool:
     if any(isinstance(call[name], tuple) for name in ("sample_rate", "delta", "t")):
         return True
     times = call["t"]
-    given = [call[name] for name in _CHANNELS] + [times if np.ndim(times) else None]
+    given = [call[name] for name in CHANNELS] + [times if np.ndim(times) else None]
     return all(one is None or int(np.size(one)) == size for one in given)
 
 
