@@ -22,6 +22,9 @@ _SECOND = 0.5
 _AGAIN = 10.0
 """Seconds in which an outlet that began again answers, at most; what it sends meanwhile is kept."""
 
+_CLOCK = 10.0
+"""Seconds in which a stream's clock is told from this machine's, at most; what is sent meanwhile is kept."""
+
 _UNDER_WAY = 1.0
 """Seconds that samples take to who listens: what an outlet has not sent when it goes is lost."""
 
@@ -75,14 +78,15 @@ class Inlet:
             raise ValueError(
                 f"a name must be that of one stream; got {len(found)} with {key} {value!r}; give one of {there}, or stop the others"
             )
-        # Stamps are brought to this machine's clock; smoothing them would hide what was lost.
-        self._inlet = pylsl.StreamInlet(found[0], max_buflen=_BUFFERED, processing_flags=pylsl.proc_clocksync)
-        self._lost = pylsl.util.LostError
+        # Nothing is done to stamps here: smoothing them hides what was lost, and what brings them to this
+        # machine's clock takes the only sign of an outlet that began again (see ``_to_our_clock``).
+        self._inlet = pylsl.StreamInlet(found[0], max_buflen=_BUFFERED, processing_flags=pylsl.proc_none)
+        self._lost, self._late = pylsl.util.LostError, pylsl.util.TimeoutError
         self.read = self.unreadable = self.restarts = 0
         self.first_unreadable = ""
         try:
             info = self._inlet.info(timeout=timeout)
-        except (self._lost, pylsl.util.TimeoutError):
+        except (self._lost, self._late):
             raise ValueError(
                 f"a stream must say its channels; got nothing from {key} {value!r} within {timeout:g} s; start its outlet again"
             ) from None
@@ -99,14 +103,27 @@ class Inlet:
         while True:
             try:
                 samples, stamps = self._inlet.pull_chunk(timeout=wait, max_samples=_MOST, min_samples=1)
+                again = self._inlet.was_clock_reset()
+                if again:
+                    self._check_same()
+                    self.restarts += 1
+                ahead = self._to_our_clock() if stamps else 0.0
             except self._lost:
                 return
-            rows = [[stamp, *self._numbers(sample)] for sample, stamp in zip(samples, stamps, strict=True)]
-            if self._inlet.was_clock_reset():
-                self._check_same()
-                self.restarts += 1
+            rows = [[stamp + ahead, *self._numbers(sample)] for sample, stamp in zip(samples, stamps, strict=True)]
+            if again:
                 rows.insert(0, [math.nan] * (1 + len(self._places)))
             yield rows
+
+    def _to_our_clock(self) -> float:
+        """Return the seconds from the stream's clock to this machine's, as the layer last measured them."""
+        try:
+            return float(self._inlet.time_correction(_CLOCK))
+        except self._late:
+            raise ValueError(
+                f"a stream's clock must answer, for its stamps are another machine's; got nothing within {_CLOCK:g} s; "
+                "let UDP through between the machines (ports 16572 to 16604)"
+            ) from None
 
     def _check_same(self) -> None:
         """Refuse an outlet that began again with other channels: the layer goes on with whatever has the same source."""
@@ -114,7 +131,7 @@ class Inlet:
         for found in pylsl.resolve_byprop("source_id", self._source, minimum=1, timeout=_AGAIN) if self._source else []:
             try:
                 said = _said(pylsl.StreamInlet(found, recover=False).info(timeout=_AGAIN))
-            except (self._lost, pylsl.util.TimeoutError):
+            except (self._lost, self._late):
                 continue
             if said != self._said:
                 raise ValueError(
