@@ -18,12 +18,13 @@ if TYPE_CHECKING:
     from tvident._files.no_values import marks_given, without_marks
     from tvident._files.rates import other_rate
     from tvident._files.recorded import FileRecording, increasing_times, read_recording, time_channels
-    from tvident._files.recordings import read
+    from tvident._files.recordings import TEXT_ENDINGS, read
     from tvident._files.stated import stated_rate
     from tvident._files.text import copy_text
 
 __all__ = [
     "TABLE_ENDINGS",
+    "TEXT_ENDINGS",
     "Channels",
     "FileError",
     "FileRecording",
@@ -71,6 +72,7 @@ _READERS = {
     "read_recording": "recorded",
     "time_channels": "recorded",
     "read": "recordings",
+    "TEXT_ENDINGS": "recordings",
     "stated_rate": "stated",
     "copy_text": "text",
 }

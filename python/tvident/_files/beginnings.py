@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 import string
 from pathlib import Path
 
@@ -28,11 +29,15 @@ _OTHER_ENDINGS = {
     ".feather": (".arrow",),
     ".h5": (".hdf5", ".hdf"),
     ".mf4": (".mdf",),
-    ".csv.gz": (".txt.gz", ".tsv.gz", ".dat.gz", ".asc.gz", ".xdfz", ".gz"),
-    ".lvm": (".csv", ".txt", ".tsv", ".dat", ".asc"),
-    ".csv": (".txt", ".tsv", ".dat", ".asc", ".lvm", ".mot", ".sto", ".uff", ".unv"),
+    ".csv.gz": (".txt.gz", ".tsv.gz", ".dat.gz", ".asc.gz", ".log.gz", ".xdfz", ".gz"),
+    ".lvm": (".csv", ".txt", ".tsv", ".dat", ".asc", ".log"),
+    ".jsonl": (".ndjson", ".json"),
+    ".csv": (".txt", ".tsv", ".dat", ".asc", ".log", ".lvm", ".mot", ".sto", ".uff", ".unv"),
 }
 """What begins in the same way."""
+
+_OF_JSON = re.compile(rb"\s*(?:\{\s*[\"}]|\[\s*[\[{\]\"0-9-])")
+"""How objects and lists begin."""
 
 _START = 512
 _PRINTABLE = frozenset(string.printable.encode())
@@ -70,7 +75,7 @@ def cure_of_name(path: Path, ending: str, said: str) -> str:
         return ""
     known = ending_by(start)
     if not known and _is_text(start):
-        known = ".csv"
+        known = ".jsonl" if _OF_JSON.match(start) else ".csv"
     endings = (known, *_OTHER_ENDINGS.get(known, ()))
     if not known or ending.lower() in endings or known in said:
         return ""

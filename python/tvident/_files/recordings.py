@@ -17,9 +17,12 @@ from tvident._files.no_values import marks_given, said_of_marks, without_marks
 from tvident._files.unpacked import ending_of
 from tvident._formats import FOLDERS, FORMATS
 
-PLAIN = (".csv", ".txt", ".tsv", ".dat", ".asc")
+PLAIN = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
 TEXT, NUMPY = (*PLAIN, ".lvm", ".mot", ".sto"), (".npy", ".npz")
 PACKED = tuple(f"{ending}.gz" for ending in PLAIN)
+TEXT_ENDINGS = (*PLAIN, *PACKED)
+"""Of text in columns."""
+JSON = (".jsonl", ".ndjson", ".json")
 ARROW = (".parquet", ".feather", ".arrow")
 """Endings of files that can be read."""
 
@@ -33,6 +36,7 @@ _READERS = dict.fromkeys((*TEXT, *PACKED), "text.read_text") | {
     ".lvm": "instrument_text.read_labview",
     ".mot": "instrument_text.read_opensim",
     ".sto": "instrument_text.read_opensim",
+    **dict.fromkeys(JSON, "json_text.read_json"),
     **dict.fromkeys(FORMATS, "foreign.read_foreign"),
     **dict.fromkeys(ARROW, "arrow.read_arrow"),
 }
@@ -77,7 +81,7 @@ def read(path: str | Path, *, missing: float | Sequence[float] = ()) -> Channels
     Parameters
     ----------
     path : str or Path
-        A text file of columns, an NPY or NPZ file, or with an extra: Parquet, HDF5, Zarr, MATLAB, TDMS, xlsx (``io``), MDF (``mdf``),
+        A text file of columns, JSON, an NPY or NPZ file, or with an extra: Parquet, HDF5, Zarr, MATLAB, TDMS, xlsx (``io``), MDF (``mdf``),
         universal files (``uff``), C3D (``c3d``), XDF (``xdf``), ROS bags and MCAP (``ros``).
     missing : float or sequence of float, optional
         Numbers that mark values that are missing, as -9999: they become NaN. One that is far from all other values of a channel is asked

@@ -12,7 +12,7 @@ from tvident._files.cells import decimal_sign, number
 from tvident._files.channels import FileError
 from tvident._files.dialect import dialect_of
 from tvident._files.names import printable
-from tvident._files.recordings import PACKED, PLAIN
+from tvident._files.recordings import TEXT_ENDINGS
 from tvident._files.text import read_start
 from tvident._files.unpacked import ending_of
 from tvident._units import UnitError, factor_between
@@ -51,7 +51,7 @@ class StatedRate:
 
 def stated_rate(path: Path) -> StatedRate | None:
     """Return the sample rate that lines above the numbers of a text state; None where none does, or several differ."""
-    if ending_of(path).lower() not in (*PLAIN, *PACKED):
+    if ending_of(path).lower() not in TEXT_ENDINGS:
         return None
     try:
         lines = read_start(path).split("\n")[:_SEARCHED]

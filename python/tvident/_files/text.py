@@ -18,6 +18,7 @@ from tvident._files.dialect import Dialect, dialect_of, mixed_line
 from tvident._files.headers import CURE
 from tvident._files.names import printable
 from tvident._files.rows import Numbers, OtherDecimalSignError, Rows, check_text
+from tvident._files.times import TimeColumn
 from tvident._files.unpacked import opened
 from tvident._units import named_unit, with_unit
 
@@ -317,10 +318,15 @@ def _columns(dialect: Dialect, parts: list[Numbers], rows: Rows, say: Say) -> Ch
         if dialect.named and names[column] == str(column) and np.isnan(columns[column]).all()
     }
     for column, times in rows.times.items():
-        columns[column], turns = times.unwrapped(columns[column])
-        since = f"since {times.first}" if times.is_dated else "of a clock"
-        often = "once" if turns == 1 else f"{turns} times"
-        again = f", which began again {often} and goes on here" if turns else ""
-        say(f"column '{printable(names[column], 40)}' holds times: read as seconds {since}{again}")
-        names[column] = with_unit(named_unit(names[column])[0], "s")
+        names[column], columns[column] = in_seconds(names[column], times, columns[column], say)
     return {names[column]: columns[column] for column in range(width) if column not in rows.dropped | hollow}
+
+
+def in_seconds(name: str, times: TimeColumn, seconds: Numbers, say: Say) -> tuple[str, Numbers]:
+    """Return the name and the samples of a column of times, which is said, as they go on where a clock began again."""
+    found, turns = times.unwrapped(seconds)
+    since = f"since {times.first}" if times.is_dated else "of a clock"
+    often = "once" if turns == 1 else f"{turns} times"
+    again = f", which began again {often} and goes on here" if turns else ""
+    say(f"column '{printable(name, 40)}' holds times: read as seconds {since}{again}")
+    return with_unit(named_unit(name)[0], "s"), found

@@ -15,7 +15,16 @@ from tvident import _arguments as arguments
 from tvident import _core
 from tvident._choices import VERSION
 from tvident._equation import GivenTerm
-from tvident._files import FileError, FileWarning, check_apart, ending_of, full_name, marks_given, other_rate
+from tvident._files import (
+    TEXT_ENDINGS,
+    FileError,
+    FileWarning,
+    check_apart,
+    ending_of,
+    full_name,
+    marks_given,
+    other_rate,
+)
 from tvident._identify import Method
 from tvident._in_pieces.copied import copied
 from tvident._in_pieces.found import FileIdentification
@@ -23,7 +32,7 @@ from tvident._in_pieces.kept import Kept, mark_of
 from tvident._in_pieces.outputs import check_output
 from tvident._in_pieces.recorded import RecordingOfFile, uniform, units_of
 from tvident._in_pieces.run import AskedOfFile, Run
-from tvident._in_pieces.sources import TEXT, Source, SourceChannel, opened
+from tvident._in_pieces.sources import Source, SourceChannel, opened
 from tvident._pieces import Given
 from tvident._units import Channel as Said
 from tvident._units import named_unit, times_in_seconds
@@ -170,7 +179,7 @@ def identify_file(
         "lag": lag,
         "quantisation": quantisation,
     }
-    is_text = ending_of(source_path).lower() in TEXT
+    is_text = ending_of(source_path).lower() in TEXT_ENDINGS
     mark = mark_of(source_path) if source_path.exists() else ""
     told = {
         "version": VERSION,

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from tvident._files import FileError, ending_of, full_name, listed, printable, without_marks
+from tvident._files import TEXT_ENDINGS, FileError, ending_of, full_name, listed, printable, without_marks
 from tvident._units import named_unit
 
 _UNITS = ("unit", "units", "Unit", "Units", "UNITS")
@@ -240,9 +240,6 @@ READERS: dict[str, Callable[[Path], Source]] = {
 }
 """By the ending."""
 
-TEXT = (".csv", ".txt", ".tsv", ".dat", ".csv.gz", ".txt.gz", ".tsv.gz", ".dat.gz")
-"""Endings of text, which is copied to rows of numbers before anything is done with it."""
-
 
 def opened(path: Path) -> Source:
     """Open a recording.
@@ -260,7 +257,7 @@ def opened(path: Path) -> Source:
     if ending != ".zarr" and not path.is_file():
         raise FileError(f"{place}: must be a file; it is a folder, a pipe or a device; name the file")
     if ending not in READERS:
-        known = ", ".join([*READERS, *TEXT])
+        known = ", ".join([*READERS, *TEXT_ENDINGS])
         raise FileError(f"{place}: files that end in {known} are read piece by piece; got '{ending}'; convert it first")
     try:
         source = READERS[ending](path)
