@@ -9,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
@@ -20,7 +21,7 @@ import recorded_files as examples
 import tvident
 from tvident import recordings
 from tvident._files import printable, read, write_table
-from tvident._formats import FORMATS, matlab
+from tvident._formats import FORMATS, hdf5, matlab
 
 JOINTS = {".mcap", ".bag"}
 """Rad, and no units in the file."""
@@ -357,3 +358,17 @@ def test_a_sheet_keeps_what_is_no_number(tmp_path: Path, columns: int) -> None:
     assert list(back) == names
     for one in back.values():
         np.testing.assert_array_equal(one, values)
+
+
+def test_a_dataset_of_hdf5_without_samples_is_said(tmp_path: Path) -> None:
+    """h5py calls it Empty, and the file was refused as damaged."""
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        file["angle"], file["torque"] = examples.ANGLE, examples.TORQUE
+        file["nothing"], file["note"] = h5py.Empty("f8"), h5py.Empty("S10")
+        file["angle"].attrs["unit"] = h5py.Empty("S3")
+        file.attrs["sample_rate"] = h5py.Empty("f8")
+    told: list[str] = []
+    found = dict(hdf5.variables(str(tmp_path / "x.h5"), told))
+    assert list(found) == ["angle", "torque"]
+    assert told[0].startswith("the sample rate of the file is no number: Empty")
+    assert told[1:] == ["note (no samples)", "nothing (no samples)"]

@@ -144,3 +144,22 @@ def test_columns_below_a_header_of_catman_are_found_as_without(tmp_path: Path) -
         np.testing.assert_array_equal(found[called], TORQUE)
     with pytest.raises(KeyError, match="one channel 'Channel_1_Data'"):
         found["Channel_1_Data"]
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        ({"Units": UNITS, **BOTH}, {"angle": "deg", "torque": "Nmm"}),
+        ({"data": {"UNITS": UNITS, **BOTH}}, {"data.angle": "deg", "data.torque": "Nmm"}),
+        ({"units": {"ANGLE": "deg", "Torque": "Nmm"}, **BOTH}, {"angle": "deg", "torque": "Nmm"}),
+        ({"Units": {"ANGLE": "deg", "Torque": "Nmm"}, "data": BOTH}, {"data.angle": "deg", "data.torque": "Nmm"}),
+        # Two that differ by capitals alone are no guess.
+        ({"units": {"ANGLE": "deg"}, "angle": ANGLE, "Angle": ANGLE}, {"angle": "", "Angle": ""}),
+        ({"units": {"Angle": "deg"}, "angle": ANGLE, "Angle": ANGLE}, {"angle": "", "Angle": "deg"}),
+    ],
+)
+def test_units_are_found_whatever_their_capitals(
+    tmp_path: Path, content: dict[str, Any], expected: dict[str, str]
+) -> None:
+    """Degrees were rad without a word."""
+    assert units_in(tmp_path / "x.mat", content) == expected

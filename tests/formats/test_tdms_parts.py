@@ -75,3 +75,17 @@ def test_a_part_that_lost_its_start_follows_the_one_before(tmp_path: Path) -> No
     found, _, remarks = read(tmp_path / "x.tdms", *[[("angle", ANGLE, {"wf_start_time": one})] for one in starts])
     np.testing.assert_allclose(found["time"], np.concatenate([T, 1.2 + T, 5 + T]), atol=1e-9)
     assert remarks == "channel angle: it was appended to 2.6 s after its end, as its times say"
+
+
+@pytest.mark.parametrize("odd", [float("nan"), float("inf"), "soon"])
+def test_an_offset_that_is_no_number_is_taken_as_none(tmp_path: Path, odd: object) -> None:
+    """All times were NaN, each channel had a group of its own, and words refused the file as damaged."""
+    found, skipped, remarks = read(
+        tmp_path / "x.tdms", [("angle", ANGLE, {"wf_start_offset": odd}), ("torque", TORQUE, {})]
+    )
+    assert list(found) == ["time", "angle", "torque"]
+    np.testing.assert_allclose(found["time"], T, atol=1e-9)
+    assert (skipped, remarks) == ("", f"channel angle: its offset is {odd}, which is taken as 0")
+    found, _, remarks = read(tmp_path / "y.tdms", [("angle", ANGLE, {"wf_increment": odd})])
+    assert list(found) == ["angle"]
+    assert remarks == f"channel angle: its sample period is {odd}, so it has no times"

@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from tvident._formats.told import Remark, cut
+
 UNITS = ("unit", "units", "Unit", "Units", "UNITS")
 """Attributes that hold a unit, or one for every column."""
 
@@ -13,6 +15,9 @@ COLUMNS = re.compile(
     r"(col|column|chan|channel|signal|var|variable)?_?(names?|labels?|headers?|titles?)|channels|signals|columns"
 )
 """What a list of the columns of a matrix beside it is called, as ``importdata`` has it in ``colheaders``."""
+
+_RATES = ("sample_rate", "sampling_rate", "fs", "Fs", "samplerate", "SampleRate")
+"""Attributes that hold a sample rate."""
 
 _WORD = re.compile(r"name|label|header|title")
 """What is about the whole where it is a text: a list of these has the name of each column."""
@@ -50,6 +55,16 @@ def first_of(attributes: Mapping[str, Any], names: Sequence[str]) -> Any:
             value = value.item() if hasattr(value, "item") and value.size == 1 else value
             return value.decode(errors="replace") if isinstance(value, bytes) else value
     return None
+
+
+def rate_in(attributes: Mapping[str, Any], skipped: list[str]) -> float | None:
+    """Return the samples per second that attributes hold; None where there are none, or they are no number, which is said."""
+    rate = first_of(attributes, _RATES)
+    try:
+        return None if rate is None else float(rate)
+    except (TypeError, ValueError):
+        skipped.append(Remark(f"the sample rate of the file is no number: {cut(str(rate))}; it is not read"))
+        return None
 
 
 def _named(name: str, unit: Any) -> str:

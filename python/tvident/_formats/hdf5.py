@@ -7,11 +7,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from typing import Any
 
-from tvident._formats.columns import COLUMNS, UNITS, channels_of, first_of
+from tvident._formats.columns import COLUMNS, UNITS, channels_of, rate_in
 from tvident._formats.told import Remark, cut, in_words
-
-RATES = ("sample_rate", "sampling_rate", "fs", "Fs", "samplerate", "SampleRate")
-"""Attributes that hold a sample rate."""
 
 
 def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
@@ -21,13 +18,16 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
 
     with h5py.File(path, "r") as file:
         found = dict(_datasets(file, "", h5py))
-        rate = first_of(file.attrs, RATES)
+        rate = rate_in(file.attrs, skipped)
         if rate is not None:
             yield "sample_rate [Hz]", np.float64(rate)
         lists = dict(_lists(found))
         for name, dataset in found.items():
             bare = name.replace("/", ".")
             if name in lists:
+                continue
+            if dataset.shape is None:  # h5py calls this Empty
+                skipped.append(f"{cut(bare)} (no samples)")
                 continue
             if dataset.dtype.kind not in "biufc" and not dataset.dtype.names:
                 skipped.append(f"{cut(bare)} (no numbers)")

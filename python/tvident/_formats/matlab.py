@@ -83,9 +83,11 @@ def _flat(
         yield from ((prefix + name, value) for name, value in of_dspace)
         return
     fields = _by_column(_with_headers(fields))
-    units: Mapping[str, Any] = next((fields[name] for name in _UNITS if isinstance(fields.get(name), Mapping)), {})
+    units: Mapping[str, Any] = next(
+        (value for name, value in fields.items() if name.lower() in _UNITS and isinstance(value, Mapping)), {}
+    )
     of_one, within = _of_structure_beside(fields, units, skipped)
-    said = {**(beside or {}), **units}
+    said = {_alike(name, fields): unit for name, unit in {**(beside or {}), **units}.items()}
     for name, value in fields.items():
         if value is units and units:
             continue
@@ -113,12 +115,14 @@ def _of_structure_beside(
 
     Units of channels that lie beside them are of those: a structure may hold what was converted. Times may lie anywhere.
     """
-    within = {name: unit for name, unit in units.items() if name not in fields}
-    recorded = [name for name in units if _has_samples(fields.get(name)) and not is_called_time(name)]
+    within = {name: unit for name, unit in units.items() if _alike(name, fields) not in fields}
+    recorded = [name for name in units if _has_samples(fields.get(_alike(name, fields))) and not is_called_time(name)]
     called = [
         name
         for name, value in fields.items()
-        if isinstance(value, Mapping) and value is not units and any(_has_samples(value.get(one)) for one in within)
+        if isinstance(value, Mapping)
+        and value is not units
+        and any(_has_samples(value.get(_alike(one, value))) for one in within)
     ]
     if recorded or not called:
         return "", {}
@@ -127,6 +131,12 @@ def _of_structure_beside(
         skipped.append(Remark(f"the structure of units is not read: {several} have the channels that it names"))
         return "", {}
     return called[0], within
+
+
+def _alike(name: str, names: Mapping[str, Any]) -> str:
+    """Return the only one of some names that differs from this one by capitals alone; itself where there is none, or it is one."""
+    found = [one for one in names if one.casefold() == name.casefold()]
+    return found[0] if name not in names and len(found) == 1 else name
 
 
 def _has_samples(value: Any) -> bool:

@@ -134,6 +134,15 @@ def _alike(value: Any, other: Any) -> bool:
         return False
 
 
+def _number(value: Any) -> float | None:
+    """Return the finite number that a property is; None where it is another, or words."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        return None
+    return number if math.isfinite(number) else None
+
+
 def _begins(parts: Parts) -> list[tuple[int, Any, float]]:
     """Return the first sample of every part whose beginning is another than that of the part before: its number, start and offset.
 
@@ -142,7 +151,7 @@ def _begins(parts: Parts) -> list[tuple[int, Any, float]]:
     found: list[tuple[int, Any, float]] = []
     for first, properties in parts:
         start = properties["wf_start_time"] if _has_start(properties) else None
-        begin = (start, float(properties.get("wf_start_offset") or 0.0))
+        begin = (start, _number(properties.get("wf_start_offset") or 0.0) or 0.0)
         if not found or begin != found[-1][1:]:
             found.append((first, *begin))
     return found
@@ -159,12 +168,15 @@ def _times(
     if period is None:
         return None, TIME
     axis = axis_of(str(properties.get("wf_xname") or ""), str(properties.get("wf_xunit_string") or ""))
-    if not 0 < float(period) < np.inf:
+    given, period = period, _number(period)
+    if period is None or period <= 0:
         skipped.append(
-            Remark(f"channel {cut(channel.name)}: its sample period is {float(period):g}, so it has no times")
+            Remark(f"channel {cut(channel.name)}: its sample period is {cut(str(given))}, so it has no times")
         )
         return None, TIME
-    period = float(period)
+    offset = properties.get("wf_start_offset")
+    if offset not in {None, ""} and _number(offset) is None:
+        skipped.append(Remark(f"channel {cut(channel.name)}: its offset is {cut(str(offset))}, which is taken as 0"))
     time = begun[0][2] + period * np.arange(samples)
     if axis[0] != TIME[0]:
         return time, axis

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from tvident._formats.columns import channels_of, first_of
-from tvident._formats.hdf5 import RATES
+from tvident._formats.columns import channels_of, rate_in
 from tvident._formats.told import Remark, cut, in_words
 
 
@@ -18,7 +17,7 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     opened: Any = zarr.open(path, mode="r")
     alone = isinstance(opened, zarr.Array)
     found = {"": (opened, [dict(opened.attrs)])} if alone else dict(_arrays(opened, "", []))
-    rate = first_of(dict(opened.attrs), RATES)
+    rate = rate_in(dict(opened.attrs), skipped)
     if rate is not None:
         yield "sample_rate [Hz]", np.float64(rate)
     for name, (array, attributes) in found.items():
