@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from tvident._files.cells import Separator, are_joined, is_present, is_remark, number, split, without_comment
 from tvident._files.channels import FileError, Say
 from tvident._files.names import listed, printable
+from tvident._files.row_names import have_row_names
 from tvident._units import is_unit, named_unit, unit_of, with_unit, without_brackets
 
 CURE = "export the channels as columns of numbers with a point as the decimal sign"
@@ -138,13 +139,13 @@ class Names:
 
     def found(self, numbers: Sequence[tuple[int, str]]) -> list[str] | None:
         """Return the names of columns, which differ, or None where the file has none; lines of numbers come with their place."""
-        names = self._found()
+        names = self._found([line for _, line in numbers])
         if names is None:
             self._check_no_fractions(numbers)
             return None
         return self._different(names)
 
-    def _found(self) -> list[str] | None:
+    def _found(self, numbers: Sequence[str]) -> list[str] | None:
         """Return the names that stand nearest above the numbers, with units where these have a line of their own."""
         said = False
         for index in reversed(range(len(self.above))):
@@ -154,6 +155,12 @@ class Names:
                 found = self._of_block(index, names)
                 self._say_unread_units(self.above[:index], found)
                 return found
+            if not said and have_row_names(line.cells, numbers, self.separator):
+                self.say(
+                    f"line {line.place} has a name less than the rows have cells: its names are of the second and later columns, "
+                    f"as R and pandas write names of rows: {listed(line.cells)}"
+                )
+                return ["", *line.cells]
             if not line.is_comment and not said:
                 self._check_no_numbers(line)
                 said = True
