@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from tvident._files.cells import Separator, are_joined, is_present, is_remark, number, split, without_comment
 from tvident._files.channels import FileError, Say
 from tvident._files.names import listed, printable
+from tvident._files.oscilloscopes import names_of_keys
 from tvident._files.row_names import have_row_names
 from tvident._units import is_unit, named_unit, unit_of, with_unit, without_brackets
 
@@ -320,6 +321,10 @@ class Names:
 
 def _without_keys(above: Sequence[Line], most: int) -> list[Line]:
     """Return lines above the numbers, of those that begin with a key the names and the units alone, without their key."""
+    of_scope = names_of_keys([line.cells for line in above], most)
+    if of_scope:
+        above[-1].cells = of_scope
+        return [above[-1]]
     keyed = {
         line.cells[0].rstrip("= ").casefold(): line for line in above if line.cells and _KEY.fullmatch(line.cells[0])
     }

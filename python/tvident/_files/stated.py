@@ -36,7 +36,7 @@ _PERIOD = re.compile(
 _BEFORE_UNIT = r"(?<=\d)(?!e[+-]?\d)(?=[^\W\d_])"
 """Where a unit follows its number without a blank, as in 500Hz."""
 
-_BEHIND_NAME = re.compile(r"(?:[\[(][^\])]*[\])])?\s*,")
+_BEHIND_NAME = re.compile(r'(?:[\[(][^\])]*[\])])?"?\s*,')
 _A_SECOND = re.compile(r"(k?)(?:sa?|samples?|scans?)(?:/s|/sec|ps)", re.IGNORECASE)
 """Units that count samples in a second, as kS/s."""
 
