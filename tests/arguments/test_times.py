@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -110,3 +111,25 @@ def test_a_unit_of_time_beside_a_rate_in_hz_is_refused() -> None:
         match=r"time_unit= is the unit of t= and delta=; got 'ms' beside sample_rate=, which is in Hz; leave it out, or give delta=",
     ):
         tvident.identify(rig.angle, rig.torque, sample_rate=1, time_unit="ms")
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "ms"), (1e6, "us"), (1e9, "ns")])
+@pytest.mark.parametrize("scatter", [0.0, 0.2])
+def test_counts_since_1970_are_no_seconds(factor: float, unit: str, scatter: float) -> None:
+    """Stamps in ms gave an inertia of 12 315 kg m² at 1 Hz, with a question; derivatives of those that scatter had none."""
+    rig = tvident.simulate_torsional_rig(duration=2.0)
+    late = scatter * np.random.default_rng(0).uniform(size=rig.time.size)
+    stamps = np.round(factor * (1_700_000_000 + rig.time + late / 1000))
+    calls: list[Callable[[], object]] = [
+        lambda: tvident.identify(rig.angle, rig.torque, t=stamps),
+        lambda: tvident.fit_local_polynomials(rig.angle, 51, t=stamps),
+        lambda: tvident.rolling_least_squares(rig.angle[:, None], rig.torque, "0.2 s", t=stamps),
+    ]
+    for call in calls:
+        with pytest.raises(ValueError, match=rf"would be of the year .* 'time \[{unit}\]', .*time_unit='{unit}'"):
+            call()
+    result = tvident.identify(rig.angle, rig.torque, t=stamps, time_unit=unit)
+    assert result.value("inertia").value == pytest.approx(0.0123, rel=0.02)
+    # Seconds since 1970, or from any zero, are seconds, and so are those of a record of many years.
+    for times in (1_700_000_000 + rig.time, 1e9 * np.arange(rig.time.size), 1e11 * (1 + np.arange(rig.time.size))):
+        tvident.fit_local_polynomials(rig.angle, 51, t=times)

@@ -17,6 +17,15 @@ from tvident._arguments.containers import plain
 
 Seconds = npt.NDArray[np.float64]
 
+_YEAR = 31_556_952.0
+"""Seconds."""
+
+_PARTS = {"ns": ("nanoseconds", 1e17, "1e9"), "us": ("microseconds", 1e14, "1e6"), "ms": ("milliseconds", 1e11, "1e3")}
+"""Parts of seconds, the times from which on they are no seconds, but, from the year 1973 on, these, and how many are a second."""
+
+_FAR = 1e5
+"""Sample periods from zero to the first sample, of a clock that began long before."""
+
 _COUNTABLE = float(1 << 53)
 """Doubles count samples up to here."""
 
@@ -151,6 +160,7 @@ def period_of_times(t: npt.ArrayLike, samples: int) -> float:
         place = int(np.flatnonzero(bad)[0])
         raise ValueError(f"t must hold finite times; t[{place}] is {seconds[place]}; repair it")
     period = float(seconds[-1] - seconds[0]) / (samples - 1)
+    check_no_counts(seconds)
     if not period > 0:
         raise _not_increasing(seconds)
     distance = np.abs(seconds - (seconds[0] + period * np.arange(samples)))
@@ -172,6 +182,26 @@ def period_of_times(t: npt.ArrayLike, samples: int) -> float:
             f"{1 / shortest:.6g} Hz; give sample_rate={rate:.9g}, or what the recorder was set to, instead of t"
         )
     return 1 / rate
+
+
+def check_no_counts(times: Seconds) -> None:
+    """Refuse times so large that they count smaller parts of seconds since 1970, as clocks of computers do."""
+    counted = counted_since_1970(float(times[0])) if times.size > 1 else None
+    if counted is not None and abs(float(times[-1] - times[0])) < (times.size - 1) * float(times[0]) / _FAR:
+        unit, words = counted
+        parts, _, many = _PARTS[unit]
+        raise ValueError(
+            f"t must be in seconds; the first, {words}; if it counts {parts} since 1970, call it 'time [{unit}]', divide it by {many}, "
+            f"or give time_unit={unit!r}"
+        )
+
+
+def counted_since_1970(first: float) -> tuple[str, str] | None:
+    """Return the unit that a first time must be counted in, since it is too large for seconds, and why in words; None where it is not."""
+    for unit, (_, least, _) in _PARTS.items():
+        if first >= least:
+            return unit, f"{first:.5g}, would be of the year {first / _YEAR + 1970:.0f} if it were seconds"
+    return None
 
 
 def _too_coarse(seconds: Seconds, distance: Seconds, period: float, quantum: float, rate: float) -> ValueError:
@@ -248,6 +278,7 @@ def irregular_at_sight(t: Any, samples: int) -> _core.RowTimes | None:
     if type(t) is not np.ndarray or t.dtype != np.float64 or t.shape != (samples,):
         return None
     seconds: Seconds = t
+    check_no_counts(seconds)
     seen = _core.RowTimes(seconds)
     return seen if _is_irregular(seconds, seen) else None
 

@@ -35,13 +35,6 @@ _PERIOD = re.compile(r"(ts|dt|delta_?t|t_?sample|t_?samp|sampl(e|ing)_?(time|per
 """What single numbers are called that are samples per second, and seconds per sample."""
 
 
-_YEAR = 31_556_952.0
-"""Seconds."""
-
-_COUNTS = (("ns", "nanoseconds", 1e17), ("us", "microseconds", 1e14), ("ms", "milliseconds", 1e11))
-"""Times from which on they are no seconds, but, from the year 1973 on, these parts of them."""
-
-
 def time_channels(names: Iterable[str]) -> list[str]:
     """Return the names, without units and groups, of channels that are called as times are."""
     bare = (named_unit(name)[0].rpartition(".")[2] for name in names)
@@ -322,12 +315,12 @@ def _rate_of(name: str, value: Channel) -> float | None:
 
 def _check_no_counts(time: npt.NDArray[np.float64], unit_said: str) -> None:
     """Refuse times so large that they count smaller parts of seconds since 1970, as clocks of computers do."""
-    for unit, word, least in _COUNTS:
-        if time[0] >= least:
-            raise ValueError(
-                f"the first, {time[0]:.5g}, would be of the year {time[0] / _YEAR + 1970:.0f} if it were seconds; call the channel "
-                f"'time [{unit}]', or give t= and time_unit='{unit}', if it counts {word} since 1970"
-            )
+    counted = arguments.counted_since_1970(float(time[0]))
+    if counted is not None:
+        unit, words = counted
+        raise ValueError(
+            f"the first, {words}; call the channel 'time [{unit}]', or give t= and time_unit='{unit}', if it counts such since 1970"
+        )
     step = float(time[-1] - time[0]) / (time.size - 1)
     if 0 < step <= arguments.MAY_BE_DAYS and unit_said:
         raise ValueError(

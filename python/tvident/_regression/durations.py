@@ -68,6 +68,7 @@ def irregular_times(asked: AskedWindows, rows: int) -> _core.RowTimes | None:
         times = np.ravel(np.asarray(arguments.times_of(times_in_seconds(asked.t)), dtype=np.float64))
         if times.size != rows or not np.isfinite(times).all():
             raise
+        arguments.check_no_counts(times)
         late = np.flatnonzero(np.diff(times) <= 0)
         if late.size:
             place = int(late[0]) + 1
