@@ -1,7 +1,14 @@
 """Reads units as headers of recordings write them, and converts to rad, N m and s."""
 
 from tvident._units.axis import Axis, axis_of, factor_said, scaled, times_in_seconds
-from tvident._units.channel import Channel, has_unit_in_attributes, in_its_unit, unit_named, unit_said
+from tvident._units.channel import (
+    Channel,
+    has_unit_in_attributes,
+    in_its_unit,
+    may_count_samples,
+    unit_named,
+    unit_said,
+)
 from tvident._units.names import derivative_units, named_unit, with_unit
 from tvident._units.parse import Unit, is_unit, unit_of, without_brackets
 from tvident._units.quantities import (
@@ -37,6 +44,7 @@ __all__ = [
     "in_words_of",
     "is_convertible",
     "is_unit",
+    "may_count_samples",
     "named_unit",
     "scaled",
     "system_of",

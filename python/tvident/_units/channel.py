@@ -16,6 +16,9 @@ from tvident._units.quantities import ROTARY, UnitError, factor_to, is_convertib
 _SIGNS, _SUMS = (np.negative, np.positive, np.absolute, np.fabs), (np.add, np.subtract)
 """What leaves the unit as it is; sums where whatever is added has no other."""
 
+_RARE = 1.5e-6
+"""Seconds from one sample to the next, at most, that few recorders reach."""
+
 _ROUNDED = 1e-6
 """By how much a whole number of milliseconds or microseconds may be another one, for rounding."""
 
@@ -232,7 +235,15 @@ def are_as_named(times: Any, unit: str) -> bool:
     if numbers.ndim != 1 or numbers.dtype.kind not in "iuf" or numbers.size < 2:  # noqa: PLR2004 - a step
         return False
     whole = np.round(numbers)
-    return bool((np.abs(numbers - whole) <= _ROUNDED).all() and whole[0] != whole[-1])
+    is_whole = bool((np.abs(numbers - whole) <= _ROUNDED).all() and whole[0] != whole[-1])
+    return is_whole and not may_count_samples(whole, unit)
+
+
+def may_count_samples(times: npt.NDArray[Any], unit: str) -> bool:
+    """Return whether times that are in microseconds or less by their name go up by one: a million samples a second, or their numbers."""
+    if not is_convertible(ROTARY, "time", unit) or factor_to(ROTARY, "time", unit, name="the time") > _RARE:
+        return False
+    return times.ndim == 1 and times.size > 1 and bool((np.diff(times) == 1).all())
 
 
 def in_its_unit(values: Any) -> Any:
