@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 import tvident
+from tvident import recordings
 from tvident._command_line import main
 
 T = np.arange(500) / 250
@@ -228,7 +230,8 @@ def test_a_sample_rate_below_the_numbers_is_not_stated_above_them(tmp_path: Path
 def test_times_are_believed_rather_than_what_stands_above_them(tmp_path: Path) -> None:
     path = tmp_path / "x.csv"
     path.write_text("Sampling rate: 500 Hz\ntime [s];angle [rad]\n0;1\n0.004;2\n0.008;1\n")
-    assert tvident.read_recording(path).sample_rate == pytest.approx(250.0)
+    with pytest.warns(recordings.FileWarning, match="500 Hz, and its times show 250 Hz, which is used"):
+        assert tvident.read_recording(path).sample_rate == pytest.approx(250.0)
     assert "no channel holds times" not in CliRunner().invoke(main, ["info", str(path)]).stdout
 
 
@@ -257,3 +260,45 @@ def test_counts_since_1970_are_no_seconds(tmp_path: Path, factor: float, unit: s
                 ValueError, match=rf"would be of the year \d+ .*'time \[{unit}\]', or give t= and time_unit='{unit}'"
             ):
                 _ = recording.sample_rate
+
+
+@pytest.mark.parametrize(
+    ("above", "times", "shown"),
+    [
+        (
+            "Name\tangle\tName\ttorque\nSampleTime[ms]\t2\tSampleTime[ms]\t2\nUnit\tdeg\tUnit\tNm\n",
+            "ms",
+            "'SampleTime[ms] 2 SampleTime[ms] 2', 500 Hz, and its times show 1000 Hz",
+        ),
+        (
+            "Abtastrate: 1000 Hz\ntime\tangle\ttime_2\ttorque\n",
+            "",
+            "'Abtastrate: 1000 Hz', 1000 Hz, and its times show 1 Hz",
+        ),
+    ],
+)
+def test_a_rate_that_is_stated_beside_times_of_another_is_said(
+    tmp_path: Path, above: str, times: str, shown: str
+) -> None:
+    """Times in ms were seconds, or a scope's files half as fast, without a word."""
+    place = tmp_path / "x.csv"
+    place.write_text(above + "".join(f"{k}\t{k % 7}\t{k}\t{k % 5}\n" for k in range(60)))
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        recording = tvident.read_recording(place)
+    assert any(f"it states {shown}, which is used: check which is right" in str(one.message) for one in said)
+    assert recording["time"].unit == times
+    told = CliRunner().invoke(main, ["info", str(place)])
+    assert f"it states {shown}" in told.stderr
+    place.write_text(place.read_text().replace("\t2\tSampleTime[ms]\t2", "\t1\tSampleTime[ms]\t1").replace("1000", "1"))
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        tvident.read_recording(place)
+    assert not any("it states" in str(one.message) for one in said)
+
+
+def test_json_is_known_from_a_pipe() -> None:
+    lines = "".join(f'{{"time": {k / 500}, "angle": {k % 7}}}\n' for k in range(60))
+    told = CliRunner().invoke(main, ["info", "-"], input=lines)
+    assert told.exit_code == 0
+    assert "uniform: 500 per unit" in told.stdout

@@ -16,7 +16,16 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import recordings
-from tvident._files import ending_by, full_name, increasing_times, listed, printable, stated_rate, time_channels
+from tvident._files import (
+    ending_by,
+    full_name,
+    increasing_times,
+    listed,
+    printable,
+    said_otherwise,
+    stated_rate,
+    time_channels,
+)
 from tvident._units import Channel, UnitError, factor_between, named_unit
 
 _RATES = {"fs", "fsamp", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency"}
@@ -94,7 +103,13 @@ def channels_in(file: str | None) -> recordings.Channels:
     """Return the channels of a file, of standard input where it is called ``-``, and none where there is none."""
     if file is None:
         return {}
-    return recordings.read(file, missing=marks_missing()) if file != "-" else _standard_input()
+    if file == "-":
+        return _standard_input()
+    found = recordings.read(file, missing=marks_missing())
+    said = said_otherwise(Path(file), found)
+    if said:
+        click.echo(f"Warning: {printable(file)}: {said}", err=True)
+    return found
 
 
 def marks_missing() -> tuple[float, ...]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tvident._files.beginnings import ending_by
     from tvident._files.no_values import marks_given, without_marks
     from tvident._files.rates import other_rate
-    from tvident._files.recorded import FileRecording, increasing_times, read_recording, time_channels
+    from tvident._files.recorded import FileRecording, increasing_times, read_recording, said_otherwise, time_channels
     from tvident._files.recordings import TEXT_ENDINGS, read
     from tvident._files.stated import stated_rate
     from tvident._files.text import copy_text
@@ -52,6 +52,7 @@ __all__ = [
     "read_recording",
     "read_result",
     "replaced",
+    "said_otherwise",
     "settings_beside",
     "stated_rate",
     "time_channels",
@@ -70,6 +71,7 @@ _READERS = {
     "FileRecording": "recorded",
     "increasing_times": "recorded",
     "read_recording": "recorded",
+    "said_otherwise": "recorded",
     "time_channels": "recorded",
     "read": "recordings",
     "TEXT_ENDINGS": "recordings",

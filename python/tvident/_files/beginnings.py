@@ -39,6 +39,9 @@ _OTHER_ENDINGS = {
 _OF_JSON = re.compile(rb"\s*(?:\{\s*[\"}]|\[\s*[\[{\]\"0-9-])")
 """How objects and lists begin."""
 
+_OF_OBJECT = re.compile(rb"\s*\[?\s*\{\s*\"[^\"\n]{0,200}\"\s*:")
+"""How an object with members begins, or a list of them."""
+
 _START = 512
 _PRINTABLE = frozenset(string.printable.encode())
 _OF_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
@@ -48,7 +51,8 @@ _LETTERS = 0.2
 
 def ending_by(start: bytes) -> str:
     """Return the ending of files that begin so; nothing where none is known to."""
-    return next((ending for magic, ending in _BEGINNINGS.items() if start.startswith(magic)), "")
+    found = next((ending for magic, ending in _BEGINNINGS.items() if start.startswith(magic)), "")
+    return found or (".jsonl" if _OF_OBJECT.match(start) else "")
 
 
 def _is_text(start: bytes) -> bool:

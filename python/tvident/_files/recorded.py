@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._files.channels import Channels, full_name
+from tvident._files.channels import Channels, FileWarning, full_name
 from tvident._files.names import listed, printable
 from tvident._files.recordings import read
 from tvident._files.stated import stated_rate
@@ -33,6 +34,10 @@ _RATE = re.compile(r"(fs|f_s|fsamp|sample_?rate|sampling_?(rate|frequency)|sampl
 
 _PERIOD = re.compile(r"(ts|dt|delta_?t|t_?sample|t_?samp|sampl(e|ing)_?(time|period|interval))", re.IGNORECASE)
 """What single numbers are called that are samples per second, and seconds per sample."""
+
+
+_NOTABLE = 0.01
+"""Of a rate: times have few digits, and recorders round what they state."""
 
 
 def time_channels(names: Iterable[str]) -> list[str]:
@@ -386,4 +391,21 @@ def read_recording(path: str | Path, *, missing: float | Sequence[float] = ()) -
     channels = read(path, missing=missing)
     stated = stated_rate(path) if not time_channels(channels) and not increasing_times(channels) else None
     rate = None if stated is None else stated.rate
+    said = said_otherwise(path, channels)
+    if said:
+        warnings.warn(f"{printable(path)}: {said}", FileWarning, stacklevel=2)
     return FileRecording(channels, sample_rate=rate, source=printable(path.name))
+
+
+def said_otherwise(path: Path, channels: Mapping[str, npt.NDArray[Any]]) -> str:
+    """Return that lines above the numbers of a text state another sample rate than its times show; nothing where they do not."""
+    stated = stated_rate(path) if time_channels(channels) or increasing_times(channels) else None
+    if stated is None:
+        return ""
+    try:
+        shown = FileRecording(channels).sample_rate
+    except ValueError:
+        return ""
+    if abs(shown / stated.rate - 1) < _NOTABLE:
+        return ""
+    return f"it states '{stated.words}', {stated.rate:.6g} Hz, and its times show {shown:.6g} Hz, which is used: check which is right"

@@ -29,7 +29,7 @@ _RATE = re.compile(
 """A short name may mean another thing, as full scale: its unit tells."""
 
 _PERIOD = re.compile(
-    r"\W*(?:(?:sampl(?:e|ing)|scan|logging)[ _.-]?(?:interval|period)|abtast(?:intervall|periode|zeit)|dt|delta[ _]?t"
+    r"\W*(?:(?:sampl(?:e|ing)|scan|logging)[ _.-]?(?:interval|period)|abtast(?:intervall|periode|zeit)|dt|delta[ _]?t|sampletime(?=\[)"
     r"|p[ée]riode d['\u2019][ée]chantillonnage|per[ií]odo de muestreo|periodo di campionamento)\b",
     re.IGNORECASE,
 )
@@ -71,7 +71,9 @@ def _above_numbers(lines: list[str]) -> list[str]:
 
 def _stated_in(lines: Iterable[str]) -> StatedRate | None:
     found = [
-        StatedRate(rate, printable(line.strip(" \t\r,;"), 60)) for line in lines if (rate := _rate_in(line)) is not None
+        StatedRate(rate, printable(" ".join(line.strip(" \t\r,;").split()), 60))
+        for line in lines
+        if (rate := _rate_in(line)) is not None
     ]
     return found[0] if len({one.rate for one in found}) == 1 else None
 
@@ -82,7 +84,8 @@ def _rate_in(line: str) -> float | None:
         said = pattern.match(line)
         if said is None:
             continue
-        rest = line[said.end() :].strip()
+        # Scopes of TwinCAT state it of every channel.
+        rest = line[said.end() :].replace(said[0], " ").strip()
         # A comma behind the name separates cells, as further ones then do; others may be decimal signs.
         between = r"[\s:;=\",]+" if _BEHIND_NAME.match(rest) else r"[\s:;=\"]+"
         cells = [one.strip("[](){}") for one in re.split(f"{between}|{_BEFORE_UNIT}", rest, flags=re.IGNORECASE)]
