@@ -152,6 +152,13 @@ def test_an_hour_is_small_opens_at_once_and_shows_every_sample(
     expected = channels["noise 2 [V]"][first : first + len(line["x"])]
     np.testing.assert_allclose(line["y"], expected, atol=np.ptp(expected) / 2 / 126 + 1e-6)
     assert "one of 127 levels between the extremes of 128 neighbours" in opened.page.inner_text("footer")
+    # Thousands of seconds look the same with a fraction and without.
+    opened.show(1234.0, 1235.0)
+    opened.drawn("noise 2")
+    ticks = opened.ask("[...document.querySelectorAll('.xtick text')].map((one) => one.textContent)")
+    assert "1234 s" in ticks
+    assert any(one.startswith("1234.") for one in ticks)
+    assert not any("," in one for one in ticks)
     # Where samples are missing there is a gap, from the first to the last.
     opened.show(1999.9, 2000.4)
     line = opened.drawn("noise 1")

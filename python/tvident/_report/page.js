@@ -191,6 +191,8 @@
         margin: { l: 64, r: 18, t: 10, b: 34 },
         paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
         font: { color: ink, size: 12, family: getComputedStyle(document.body).fontFamily },
+        // Without a sign between thousands: plotly writes one in times with a fraction alone.
+        separators: ".",
         showlegend: false, hovermode: "x", dragmode: isTouch ? false : "zoom", shapes, annotations,
         hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { color: colour("ink") } },
         xaxis: { ...apart, ticklen: 9, range: [shown.from, shown.to], ticksuffix: " s", gridcolor: grid, zeroline: false, exponentformat: "none", separatethousands: false, hoverformat: ".6f", nticks: Math.max(3, Math.round(this.div.clientWidth / 120)) },
