@@ -251,3 +251,32 @@ def test_completion_shows_what_users_call_and_the_version() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split()[0] == "False"
+
+
+def test_every_result_is_one_line_of_words_in_a_console(tmp_path: Path) -> None:
+    """Eight of them were all their arrays, over up to sixty lines."""
+    rig = tvident.simulate_torsional_rig(duration=4.0)
+    found = tvident.identify(rig.angle, rig.torque, sample_rate=1000)
+    rows = np.stack([rig.angle, np.ones(rig.angle.size)], axis=1)
+    rig.save(tmp_path / "x.csv")
+    in_pieces = tvident.identify_file(
+        tmp_path / "x.csv", tmp_path / "y.csv", angle="angle", torque="torque", sample_rate=1000
+    )
+    lines = {
+        "<Recording of 4000 samples at 1000 Hz: angle, torque; true stiffness": rig,
+        f"<Scan of {', '.join(found.scan().estimates)} by": found.scan(),
+        f"<constant: {found.value('inertia')}>": found.value("inertia"),
+        f"<windowed: {found.value('stiffness')}>": found.value("stiffness"),
+        "<RollingRegression of 4000 rows, 4000 with a window, medians of params": tvident.rolling_least_squares(
+            rows, rig.torque, 200
+        ),
+        "<ExperimentPlan of": tvident.plan_experiment(result=found),
+        "<FileIdentification of 4000 samples, 4000 rows in": in_pieces,
+        "<StreamedDerivatives at 3971 samples, time 0 to 3970>": tvident.LocalPolynomialStream(51).push(rig.angle),
+        "<StreamedRegression at 3901 rows, row 0 to 3900>": tvident.RollingStream(200).push(rows, rig.torque),
+    }
+    for begin, one in lines.items():
+        assert repr(one).startswith(begin)
+        assert "\n" not in repr(one)
+        assert len(repr(one)) < 300
+    assert "inertia" in repr(in_pieces)

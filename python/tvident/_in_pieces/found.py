@@ -66,6 +66,14 @@ class FileIdentification:
     advice: tuple[str, ...] = ()
     assumed: Mapping[str, str] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        named = [
+            f"{name} {arguments.with_error(value, error)} {self.units.get(name, '')}".rstrip()
+            for name, (value, error) in self.constants.items()
+        ]
+        found = f": {'; '.join(named)}" if named else ""
+        return f"<FileIdentification of {self.samples} samples, {self.rows} rows in {self.path}{found}>"
+
     def summary(self) -> str:
         """Return in words what was found, and what is worth doing.
 

@@ -78,6 +78,10 @@ class ExperimentPlan:
     reached: bool
     units: Mapping[str, str]
 
+    def __repr__(self) -> str:
+        errors = ", ".join(f"{name} ± {100 * error:.2g} %" for name, error in self.errors.items())
+        return f"<ExperimentPlan of {self.duration:.4g} s: {errors}>"
+
     def excitation(self, *, sample_rate: float, seed: int = 0) -> Array:
         """Return the torque as samples: sines of random phase.
 

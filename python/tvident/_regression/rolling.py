@@ -29,6 +29,10 @@ _LOOKED_AT = 64
 """Values of a regressor that show whether it may be a constant; only then all of them are looked at."""
 
 
+_SHOWN = 6
+"""Parameters that a line of words shows."""
+
+
 @dataclass(frozen=True, eq=False)
 class RollingRegression:
     """The result of :func:`rolling_least_squares`; NaN where the status says INVALID.
@@ -83,6 +87,13 @@ class RollingRegression:
     condition: npt.NDArray[np.float64]
     status: npt.NDArray[np.uint16]
     lags: int | None = None
+
+    def __repr__(self) -> str:
+        good = np.isfinite(self.params).reshape(len(self.params), -1).all(axis=1)
+        medians = np.median(self.params[good].reshape(int(good.sum()), -1), axis=0) if good.any() else np.empty(0)
+        shown = [f"{one:.4g}" for one in medians[:_SHOWN]] + ["…"] * (len(medians) > _SHOWN)
+        found = f", medians of params {', '.join(shown)}" if shown else ""
+        return f"<RollingRegression of {good.size} rows, {good.sum()} with a window{found}>"
 
 
 # All but the data are options, as users call it.

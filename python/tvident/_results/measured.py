@@ -43,6 +43,9 @@ class Measured(NamedTuple):
         """Whether there is more than one value."""
         return self.least < self.greatest
 
+    def __repr__(self) -> str:
+        return f"<{self.kind}: {self}>"
+
     def __str__(self) -> str:
         words = with_error(self.value, self.stderr)
         if self.changes:

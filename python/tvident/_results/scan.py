@@ -87,6 +87,15 @@ class Scan:
     units: Mapping[str, str] = field(default_factory=lambda: UNITS)
     used: int | None = None
 
+    def __repr__(self) -> str:
+        if not self.window_length.size:
+            return "<Scan of no widths>"
+        agree = (
+            "no plateau" if self.plateau is None else f"the same from {self.plateau[0]} to {self.plateau[1]} samples"
+        )
+        widths = f"{self.window_length.size} widths from {self.window_length[0]} to {self.window_length[-1]} samples"
+        return f"<Scan of {', '.join(self.estimates)} by {widths}: {agree}>"
+
     def summary(self) -> str:
         """Return a table with a row for every width; a star marks the plateau.
 

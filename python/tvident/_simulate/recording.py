@@ -62,6 +62,11 @@ class Recording:
     true_torque: Array
     sample_rate: float
 
+    def __repr__(self) -> str:
+        least, greatest = self.stiffness.min(), self.stiffness.max()
+        truth = f"{least:.4g}" if least == greatest else f"{least:.4g} to {greatest:.4g}"
+        return f"<Recording of {self.angle.size} samples at {self.sample_rate:g} Hz: angle, torque; true stiffness {truth} N m/rad>"
+
     @property
     def truth(self) -> dict[str, Array]:
         """The true parameters by name, arrays of shape (n,): ``"inertia"``, ``"damping"``, ``"stiffness"``.

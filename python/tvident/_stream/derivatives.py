@@ -12,7 +12,7 @@ from tvident import _arguments as arguments
 from tvident import _core
 from tvident._choices import Criterion, Selection
 from tvident._derivatives import HIGHEST_ORDER, SHORTEST_WINDOW, check_weighted, gaps_given, leaves_out, plan
-from tvident._stream.pieces import SampleStream, not_weighted_alike
+from tvident._stream.pieces import SampleStream, not_weighted_alike, span_of
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -39,6 +39,9 @@ class StreamedDerivatives:
     order: npt.NDArray[np.uint8]
     sigma: npt.NDArray[np.float64]
     status: npt.NDArray[np.uint16]
+
+    def __repr__(self) -> str:
+        return f"<StreamedDerivatives at {span_of(self.time, 'samples', 'time')}>"
 
 
 class LocalPolynomialStream(SampleStream[StreamedDerivatives]):

@@ -168,3 +168,9 @@ def piece(name: str, values: npt.ArrayLike) -> npt.NDArray[Any]:
             f"{name} must be one sample or several along one axis; got shape {array.shape}; make a stream for every record"
         )
     return np.atleast_1d(array)
+
+
+def span_of(places: npt.NDArray[Any], many: str, one: str) -> str:
+    """Return how many samples or rows a piece has, and which, in words."""
+    where = f", {one} {places[0]:g} to {places[-1]:g}" if places.size else ""
+    return f"{places.size} {many}{where}"

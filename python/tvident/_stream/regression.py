@@ -20,7 +20,7 @@ from tvident._regression import (
     least_given,
     unit_of_weights,
 )
-from tvident._stream.pieces import Stream, not_weighted_alike
+from tvident._stream.pieces import Stream, not_weighted_alike, span_of
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -44,6 +44,9 @@ class StreamedRegression:
     rss: npt.NDArray[np.float64]
     condition: npt.NDArray[np.float64]
     status: npt.NDArray[np.uint16]
+
+    def __repr__(self) -> str:
+        return f"<StreamedRegression at {span_of(self.row, 'rows', 'row')}>"
 
 
 class RollingStream(Stream[StreamedRegression]):
