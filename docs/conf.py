@@ -48,7 +48,8 @@ warnings.filterwarnings("ignore", message=".*non-GUI backend.*", category=UserWa
 
 html_theme = "pydata_sphinx_theme"
 html_title = "tvident"
-html_static_path: list[str] = []
+html_static_path = ["style"]
+html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_theme_options = {
     "navigation_with_keys": False,
@@ -58,7 +59,8 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": [],
 }
-html_sidebars: dict[str, list[str]] = {"index": []}
+# Pages of the first level have nothing below them to list.
+html_sidebars: dict[str, list[str]] = {"*": []}
 
 # Pages link to files of the repository that are no pages of the site; the tests follow these links.
 suppress_warnings = ["myst.xref_missing"]
