@@ -17,7 +17,7 @@ _OTHER_RATE = 0.1
 """Times of few digits and gaps move steps by less than this part; a wrong rate is off by more."""
 
 _CALLED = re.compile(
-    r"(t|time|times|zeit|temps|tiempo|tempo|x_value|timestamps?|elapsed( time)?|time_?stamp"
+    r"_{0,2}(t|time|times|zeit|temps|tiempo|tempo|x_value|timestamps?|elapsed( time)?|time_?stamp"
     r"|(unix|epoch|utc|gps|abs(olute)?|rel(ative)?|elapsed|running|recording|system|mess)[ _.-]{0,2}(time|zeit|timestamp)"
     r"|time[ _.-]?(unix|epoch|utc|abs(olute)?|rel(ative)?))([ _.-]?\d+)?",
     re.IGNORECASE,

@@ -39,19 +39,19 @@ def read_json(path: Path, say: Say) -> Channels:
         lines = text.split("\n")
         if error.pos >= len(text.rstrip()) and len([line for line in lines if line.strip()]) <= 1:
             raise FileError(f"JSON must be whole; this one ends in the middle ({error.msg}); copy it again") from None
-        return _of_samples(_of_lines(lines, say), say)
+        return samples_of(_of_lines(lines, say), say)
     except RecursionError:
         raise FileError(f"objects must be at most {_DEEPEST} deep; these are deeper; write {_LINES}") from None
     if isinstance(whole, list) and whole and all(isinstance(one, Mapping) for one in whole):
-        return _of_samples(list(enumerate(whole, 1)), say)
+        return samples_of(list(enumerate(whole, 1)), say)
     if isinstance(whole, Mapping) and isinstance(whole.get("columns"), list) and isinstance(whole.get("data"), list):
         # As pandas writes a table that is split.
         names = [str(name) for name in whole["columns"]]
-        return _of_samples(
+        return samples_of(
             [(place, dict(zip(names, row, strict=False))) for place, row in enumerate(whole["data"], 1)], say
         )
     if isinstance(whole, Mapping) and not any(isinstance(one, list | Mapping) for one in whole.values()):
-        return _of_samples([(1, whole)], say)
+        return samples_of([(1, whole)], say)
     if isinstance(whole, Mapping | list):
         return numeric(_of_columns("", whole if isinstance(whole, Mapping) else {"": whole}, say), say)
     raise FileError(f"JSON must hold samples; this one holds {printable(str(whole), 40)} alone; write {_LINES}")
@@ -101,7 +101,7 @@ def _of_lines(lines: Sequence[str], say: Say) -> list[tuple[int, Any]]:
     return found
 
 
-def _of_samples(rows: Sequence[tuple[int, Any]], say: Say) -> Channels:
+def samples_of(rows: Sequence[tuple[int, Any]], say: Say) -> Channels:
     """Return the channels of samples, each an object with its place: NaN where one lacks a member that others have."""
     columns: dict[str, dict[int, Any]] = {}
     for row, (place, one) in enumerate(rows):

@@ -31,7 +31,7 @@ ARROW = (".parquet", ".feather", ".arrow")
 RECIPE = "numpy.savez('x.npz', angle=…, torque=…, sample_rate=…)"
 """What anybody can do about a file that nobody reads."""
 
-_READERS = dict.fromkeys((*TEXT, *PACKED), "text.read_text") | {
+_READERS = dict.fromkeys((*TEXT, *PACKED), "forms.read_any_text") | {
     ".npy": "arrays.read_npy",
     ".npz": "arrays.read_npz",
     ".lvm": "instrument_text.read_labview",

@@ -17,7 +17,6 @@ from tvident._files.channels import Channels, FileError, Say
 from tvident._files.dialect import Dialect, dialect_of, mixed_line
 from tvident._files.headers import CURE
 from tvident._files.names import printable
-from tvident._files.oscilloscopes import START, read_scope
 from tvident._files.rows import Numbers, OtherDecimalSignError, Rows, check_text
 from tvident._files.times import TimeColumn
 from tvident._files.unpacked import opened
@@ -73,8 +72,6 @@ _COMPRESSED = {
 
 def read_text(path: Path, say: Say) -> Channels:
     """Read columns of numbers, with or without names, separated by commas, semicolons, tabs, bars or blanks."""
-    if START.match(read_start(path)):
-        return read_scope(read_whole(path), read_columns, say)
     return _decoded(path, lambda file: read_columns(file, say))
 
 
