@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -78,3 +79,14 @@ def test_times_of_plotjuggler_are_known(tmp_path: Path) -> None:
     """`__time` was no channel of times."""
     found = read(tmp_path, "__time,/joint/position\n" + "".join(f"{1.7e9 + t:.6f},{a}\n" for t, a, _ in ROWS))
     assert found.sample_rate == pytest.approx(500)
+
+
+@pytest.mark.parametrize("odd", ["angle:{}x", "angle{}:1", "angle{}x", "{}", "angle:1{},"])
+def test_long_runs_of_blanks_take_no_time(tmp_path: Path, odd: str) -> None:
+    """Each blank was tried as the end of a value with all that follow: minutes for a line."""
+    content = lines("time:{0},angle:{1},torque:{2}") + f"time:1,{odd.format(' ' * 300_000)}\n"
+    for place in (content, "".join(reversed(content.splitlines(keepends=True)))):
+        (tmp_path / "run.log").write_text(place)
+        with warnings.catch_warnings(), suppress(recordings.FileError):
+            warnings.simplefilter("ignore", recordings.FileWarning)
+            assert recordings.read(tmp_path / "run.log")["torque"].size >= COUNT

@@ -11,10 +11,10 @@ from tvident._files.names import printable
 
 _NAME = r"[^\W\d][^:=,;|\t\n\"{}]{0,60}?"
 _NAMED = (
-    re.compile(rf"\s*({_NAME})\s*[:=]\s*([^,;|\t\n]*?)\s*(?:[,;|\t]+|$)"),
-    re.compile(r"\s*([^\W\d][^:=,;|\s\"{}]{0,60})\s*[:=]\s*([^,;|\s]+)(?:\s+|$)"),
+    re.compile(rf" *({_NAME}) {{0,3}}[:=]([^,;|\t\n]*)(?:[,;|\t]+|$)"),
+    re.compile(r" *([^\W\d][^:=,;|\s\"{}]{0,60}) {0,3}[:=] {0,3}([^,;|\s]+)(?:\s+|$)"),
 )
-"""A cell with its name: separated by signs, or by blanks."""
+"""A cell with its name: separated by signs, or by blanks. No part may end in several places of a run of blanks, however long it is."""
 
 _LOOKED_AT = 6
 """Lines that tell. The first may be cut, where somebody began to listen."""
@@ -31,7 +31,7 @@ def _pairs(line: str, form: re.Pattern[str]) -> list[tuple[str, str]]:
         cell = form.match(line, place)
         if cell is None or cell.end() == place:
             return []
-        found.append((cell[1].strip(), cell[2]))
+        found.append((cell[1].strip(), cell[2].strip()))
         place = cell.end()
     names = [name for name, _ in found]
     return found if len(set(names)) == len(names) else []

@@ -17,7 +17,9 @@ _LABELS, _TRACES = ("label", "labels"), ("tracename",)
 _UNITS, _UNIT_OF_TIMES = ("vertical units", "vunit"), ("horizontal units", "hunit")
 """Keys of lines that say something of every channel (Tektronix, Yokogawa)."""
 
-_COUNTED = re.compile(r"X,(?P<names>[^\n]*?),? *Start, *Increment[, ]*\r?\nSequence,(?P<rest>[^\n]*)\n", re.IGNORECASE)
+_COUNTED = re.compile(
+    r"X,(?P<names>[^\n]*?),? {0,3}Start, {0,3}Increment[, ]*\r?\nSequence,(?P<rest>[^\n]*)\n", re.IGNORECASE
+)
 """How a file of Rigol begins whose rows count samples."""
 
 _BESIDE = re.compile(r'"?Record Length"?,[^,\n]*,,[^,\n]*,', re.IGNORECASE)
