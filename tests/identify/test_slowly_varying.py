@@ -190,6 +190,44 @@ def test_a_term_that_is_missing_is_no_damping_that_swings(missing: str) -> None:
     assert result.record_status & (Status.NOISE_MODEL | Status.TERM_SUSPECTED)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("names", "pattern", "seed", "periods"),
+    [
+        (("inertia", "damping"), "constant", 2, (3.3, 4.5)),
+        (("inertia",), "ramp", 1, (2.1,)),
+        *long((("inertia", "damping"), "slider", 1, (2.1, 2.9)), (("inertia",), "slider", 2, (3.3,))),
+    ],
+)
+def test_what_swings_is_seen_where_nearly_every_row_is_beyond_what_counts(
+    names: tuple[str, ...], pattern: Any, seed: int, periods: tuple[float, ...]
+) -> None:
+    """Squares beyond the largest that counts compared nothing: the inertia was constant and 22 % off, by 29 errors, trusted."""
+    changing: dict[str, Any] = {
+        name: lambda t, name=name, period=period: 2 * MEAN[name] * (1 + 0.3 * np.sin(2 * np.pi * t / period))
+        for name, period in zip(names, periods, strict=True)
+    }
+    rig = tvident.simulate_torsional_rig(60.0, 500, seed, pattern, torque_snr_db=60, angle_noise=1e-4, **changing)
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=500)
+    kinds = result.settings["kinds"]
+    assert {name for name in MEAN if kinds[name] == "varying"} == set(names)
+    for one in (*names, "stiffness"):
+        true, trusted = getattr(rig, one), result.trusted
+        assert np.sqrt(np.mean((getattr(result, one)[trusted] / true[trusted] - 1) ** 2)) < 0.05
+    assert np.mean(result.trusted) > 0.9
+
+
+@pytest.mark.parametrize("missing", ["coulomb", "late"])
+def test_what_is_missing_is_nothing_that_swings_where_nearly_every_row_is_beyond_what_counts(missing: str) -> None:
+    rig = tvident.simulate_torsional_rig(30.0, 500, 1, "ramp", torque_snr_db=60, angle_noise=1e-4)
+    torque = np.roll(rig.torque, 4)
+    if missing == "coulomb":
+        torque = rig.torque + 0.1 * rig.torque.std() * np.sign(np.asarray(rig.true_velocity))
+    result = tvident.identify(rig.angle, torque, sample_rate=500)
+    assert "varying" not in result.settings["kinds"].values()
+    assert result.record_status & (Status.NOISE_MODEL | Status.TERM_SUSPECTED | Status.LAG_SUSPECTED)
+
+
 @pytest.mark.parametrize("swings", [True, False])
 def test_what_swings_and_was_given_as_constant_is_contradicted(swings: bool) -> None:
     """It was another sensor, or noise that is not white, that was blamed."""

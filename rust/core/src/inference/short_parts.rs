@@ -30,6 +30,9 @@ const WINDOWS: usize = 2;
 /// Parts that are compared: of shorter ones some all over the record.
 const COUNTS: [usize; 2] = [16, 64];
 
+/// The part of the record that the shortest are, where windows are longer: these were chosen while what swings was constant.
+const SHORTEST: usize = 256;
+
 /// Of more rows parts are as long as of so many.
 const MOST_ROWS: usize = 1 << 15;
 
@@ -101,6 +104,9 @@ fn lengths(rows: usize, of_windows: usize) -> Vec<(usize, usize)> {
     let mut lengths: Vec<(usize, usize)> = COUNTS.iter().map(|count| (some / count, *count)).collect();
     if of_windows < some / few {
         lengths.push((of_windows, (rows / of_windows.max(1)).min(many)));
+    }
+    if of_windows > some / many {
+        lengths.push((some / SHORTEST, many));
     }
     lengths.retain(|(length, _)| *length > 0);
     lengths.sort_unstable_by(|a, b| b.cmp(a));

@@ -1,7 +1,6 @@
 //! Setting constants free: those that grow, that swing, or that all change beside one that does.
 
 use std::borrow::Cow;
-use std::ops::Range;
 
 use crate::equation::rows::Rows;
 use crate::error::Error;
@@ -10,28 +9,22 @@ use crate::identify::weak::decide::{BADLY, BETTER};
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
 use crate::inference::constancy::Test;
-use crate::inference::cross_validation::best_length;
 use crate::inference::part_constants::TestNoise;
-use crate::inference::short_parts::{LEFT_OF_SWINGS, MORE_THAN_NOISE, Swinging, swinging};
+use crate::inference::short_parts::{MORE_THAN_NOISE, Swinging, swinging};
 use crate::inference::slowly_varying;
 use crate::regression::fit::Fit;
 use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
 use crate::regression::residuals::residuals;
-use crate::regression::subsample::{holds, places_of, stretches_of_rows, thinned_rows};
-use crate::regression::window_length::Scale;
 use crate::weak_form::weak_rows::WeakRows;
 
 /// The part of the mean squared error of predicting rows that must be left where no test of parts says that anything changes.
 const FAR_BETTER: f64 = 0.5;
 /// The same where rows are predicted well and another changes: of constants that are set free beside it for nothing .96 is left at least.
-const A_LITTLE_BETTER: f64 = 0.9;
+pub(crate) const A_LITTLE_BETTER: f64 = 0.9;
 
 /// As `LEFT_OF_SWINGS`, in windows beside constants alone: what makes a stiffness or a damping of a spring that hardens or a drag leaves .21 and more.
 const LEFT_IN_WINDOWS: f64 = 0.15;
-
-/// The part that is left after the first round of a search, from which on it is not worth another.
-const HOPELESS: f64 = 0.5;
 
 /// Where constants jump, those that do not change in between stand unless others predict so much better.
 const SIMPLER: f64 = 0.98;
@@ -54,31 +47,16 @@ impl Session<'_, '_, '_> {
         let swinging = self.swinging(rows, decided)?;
         decided.longest = swinging.as_ref().and_then(|one| one.longest);
         if let Some(growing) = growing {
-            let free = self.freed(rows, model, decided, (growing, f64::INFINITY))?;
+            let free = self.freed(rows, model, decided, (&[growing], f64::INFINITY))?;
             if free.error < FAR_BETTER * decided.error {
                 *decided = free;
                 return Ok(true);
             }
         }
-        let Some(Swinging { constant, test, .. }) = swinging else { return Ok(false) };
-        let swinging = decided.model.constant[constant];
-        let is_open = self.undecided().contains(&swinging);
-        let rows = if is_open { Cow::Borrowed(rows) } else { Cow::Owned(without_rate(rows, swinging)) };
-        if self.is_hopeless(&rows, model, decided, swinging)? {
-            return Ok(false);
+        match swinging {
+            Some(swinging) => self.set_swinging_free(rows, model, decided, swinging),
+            None => Ok(false),
         }
-        let hopeless = 1.0 + HOPELESS * (decided.error - 1.0).max(0.0);
-        let free = self.freed(&rows, model, decided, (swinging, hopeless))?;
-        let is_settled = free.error - 1.0 < LEFT_OF_SWINGS * (decided.error - 1.0);
-        if !is_settled || free.error >= A_LITTLE_BETTER * decided.error {
-            return Ok(false);
-        }
-        if is_open {
-            *decided = free;
-        }
-        decided.tests.retain(|(one, _)| *one != swinging);
-        decided.tests.push((swinging, test));
-        Ok(is_open)
     }
 
     /// What a record is where one of its constants is followed in windows, as a stiffness is, beside the others alone; `None` where that is not determined.
@@ -155,61 +133,26 @@ impl Session<'_, '_, '_> {
     }
 
     /// Which of the constants are of the motion.
-    fn of_motion(&self, decided: &Decided) -> Vec<bool> {
+    pub(crate) fn of_motion(&self, decided: &Decided) -> Vec<bool> {
         let coefficients = self.record.coefficients.len();
         decided.model.constant.iter().map(|&one| one < coefficients).collect()
     }
 
-    /// What a record is with one of its constants set free, or roughly where it is hopeless; the error is infinite where that is not determined.
-    fn freed(
+    /// What a record is with some of its constants set free, or roughly where it is hopeless; the error is infinite where that is not determined.
+    pub(crate) fn freed(
         &mut self,
         rows: &Rows,
         model: &Model,
         decided: &Decided,
-        (constant, hopeless): (usize, f64),
+        (constants, hopeless): (&[usize], f64),
     ) -> Result<Decided, Error> {
         let mut free = decided.clone();
-        free.slow.push(constant);
+        free.slow.extend_from_slice(constants);
         self.set_free(rows, model, &mut free, hopeless)?;
         if free.fit.is_none() {
             free.error = f64::INFINITY;
         }
         Ok(free)
-    }
-
-    /// Whether stretches of a long record say that it is not worth following a constant along all of it: even a curve of its own in each leaves too much of
-    /// what noise does not explain. Only where windows are short, as they are that follow what is missing: stretches hold many of them.
-    fn is_hopeless(&mut self, rows: &Rows, model: &Model, decided: &Decided, one: usize) -> Result<bool, Error> {
-        let (Some(stretches), Some(first)) = (stretches_of_rows(rows.len()), decided.first) else { return Ok(false) };
-        let length = stretches.first().map_or(0, Range::len);
-        if first.span() * slowly_varying::STRETCH > length {
-            return Ok(false);
-        }
-        let some = thinned_rows(rows, &stretches);
-        let scales: Vec<Scale> = decided.scales.iter().copied().filter(|&scale| holds(scale)).collect();
-        let (noise, expected, instructions) = (self.noise[0], decided.expected, self.options.instructions);
-        let problem = decided.model.problem(&some, &some.rhs, noise, None);
-        let before = best_length(&problem, (&scales, &[first]), expected, instructions, &mut self.stages)?;
-        let Some((_, before)) = before else { return Ok(false) };
-        let others = decided.model.constant.iter().copied().filter(|&other| other != one);
-        let model = Model { constant: std::iter::once(one).chain(others).collect(), ..model.clone() };
-        let starts: Vec<usize> = places_of(&stretches).iter().skip(1).map(|place| place.start).collect();
-        let search = slowly_varying::SlowSearch {
-            rows: &some,
-            model: &model,
-            coefficients: 1,
-            scales: &scales,
-            longest: decided.longest.map(|longest| longest.min(length)),
-            breaks: &starts,
-            ..self.slow_search(rows, &model, decided)
-        };
-        let mut left = slowly_varying::find(&search, first, &mut self.stages)?.map_or(0.0, |found| found.error);
-        if !rows.jumps.is_empty() {
-            let jumping = slowly_varying::SlowSearch { breaks: &some.jumps, ..search };
-            let found = slowly_varying::find(&jumping, first, &mut self.stages)?;
-            left = left.min(found.map_or(0.0, |found| found.error));
-        }
-        Ok(left - 1.0 > HOPELESS * (before - 1.0))
     }
 
     /// The undecided constant that seems to grow most along the record.
@@ -220,15 +163,6 @@ impl Session<'_, '_, '_> {
         let growing = growing.filter(|(one, trend)| undecided.contains(one) && trend.is_conspicuous());
         let most = growing.max_by(|a, b| a.1.excess().total_cmp(&b.1.excess()));
         Ok(most.map(|(most, _)| most))
-    }
-
-    /// The constant of the motion that differs most between short parts of the record, if one does.
-    pub(crate) fn swinging(&mut self, rows: &Rows, decided: &Decided) -> Result<Option<Swinging>, Error> {
-        let Some(fit) = decided.fit.as_ref().filter(|fit| fit.scale.is_some()) else { return Ok(None) };
-        let problem = decided.problem(decided.rows(rows), self.noise[0]);
-        let may = self.of_motion(decided);
-        let (noise, instructions) = (self.test_noise(decided), self.options.instructions);
-        Ok(swinging(&problem, (fit, &may), noise, instructions, &mut self.stages)?.into_iter().next())
     }
 
     /// Sets all that was tested free where one of them changes, if rows are predicted better then: a parameter that varies beside one that is held
@@ -311,7 +245,7 @@ impl Session<'_, '_, '_> {
 
 /// Rows in which the rate of a coefficient that was given as constant, for which they have no column, makes nothing: good enough to tell whether it
 /// changes.
-fn without_rate(rows: &Rows, coefficient: usize) -> Rows {
+pub(crate) fn without_rate(rows: &Rows, coefficient: usize) -> Rows {
     let mut rows = rows.clone();
     rows.regressors[coefficient].companion = vec![0.0; rows.len()];
     rows

@@ -20,6 +20,7 @@ pub(crate) mod report;
 pub(crate) mod scan;
 pub(crate) mod session;
 pub(crate) mod shown_noise;
+pub(crate) mod swings;
 pub(crate) mod torque_jumps;
 pub(crate) mod weighting;
 pub(crate) mod windows;
