@@ -203,8 +203,9 @@ class Explained:
         if "lag" not in self.chosen:
             return []
         if self.found.lag is None:
+            held = f", and errors hold one of {self.found.untold_lag:.1g} samples" if self.found.untold_lag else ""
             return [
-                "the record does not separate a lag of the torque from damping: lag 0 is used; excite more frequencies, or give lag="
+                f"the record does not separate a lag of the torque from damping: lag 0 is used{held}; excite more frequencies, or give lag="
             ]
         lag = self.found.lag
         return [

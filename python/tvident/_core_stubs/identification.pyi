@@ -40,7 +40,7 @@ class WeakForm:
         tested: Sequence[int] | None = None,
         near: Sequence[int | None] | None = None,
         width_from: Sequence[str | None] | None = None,
-        found_lag: bool = False,
+        found_lag: Sequence[float] | None = None,
     ) -> WeakForm: ...
 
 @final
@@ -267,6 +267,8 @@ class Identification:
     def unexplained(self) -> bool: ...
     @property
     def lag(self) -> Estimate | None: ...
+    @property
+    def untold_lag(self) -> float: ...
     @property
     def angle_zero(self) -> Estimate | None: ...
     @property

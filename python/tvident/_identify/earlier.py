@@ -35,6 +35,7 @@ _BESIDE_FORM = frozenset(
             "lag",
             "lag_stderr",
             "lag_samples",
+            "lag_untold",
             "angle_zero",
             "shown_noise",
             "stderr_factors",
@@ -176,7 +177,7 @@ def _check_names(earlier: Mapping[str, Any], kinds: Mapping[str, Any], known: Ma
 
 def _spoiled(earlier: Mapping[str, Any]) -> str:
     """Return the first entry that is missing or not as results have it, "" where all are: files of settings may be edited, or others."""
-    lists, numbers = ("own_terms", "tested"), ("lag_samples", "shown_noise")
+    lists, numbers = ("own_terms", "tested"), ("lag_samples", "lag_untold", "shown_noise")
     name = earlier.get("form")
     if not isinstance(name, str) or name not in _FORMS:
         return "form"

@@ -87,6 +87,8 @@ class Request:
         The windows near which it compared lengths.
     lag_stderr : float or sequence of float, optional
         Of a lag that an earlier result found, in seconds.
+    lag_untold : sequence of float
+        Samples of it that were not told, as the search for it did not settle; none where it did.
     """
 
     name: str
@@ -108,6 +110,7 @@ class Request:
     width_from: Sequence[str | None] = ()
     windows_near: Sequence[int | None] = ()
     lag_stderr: Any = None
+    lag_untold: Sequence[float] = ()
 
     @property
     def has_spring(self) -> bool:
@@ -219,6 +222,7 @@ def resolve(
         width_from=of_each(earlier, "width_from") if earlier is not None and not has_form else (),
         windows_near=of_each(earlier, "windows_near") if earlier is not None and not has_form else (),
         lag_stderr=None if earlier is None or "lag" in given else earlier.get("lag_stderr"),
+        lag_untold=earlier.get("lag_untold") or () if same_lag and earlier is not None else (),
     )
 
 

@@ -351,7 +351,7 @@ class Task:
             tested=[self._names.index(name) for name in request.tested if name in self._names],
             near=request.windows_near if len(request.windows_near) == records else None,
             width_from=request.width_from if len(request.width_from) == records else None,
-            found_lag="lag" in request.kept,
+            found_lag=request.lag_untold if "lag" in request.kept else None,
         )
 
     def _each(self, name: str) -> Sequence[Any]:

@@ -94,7 +94,7 @@ def together(each: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             settings[name] = median(values)
     inner = {name: [one["inner"][name] for one in each if name in one["inner"]] for name in settings["inner"]}
     settings["inner"] = {name: median(values) for name, values in inner.items()}
-    for name in ("lag_samples", "lag_stderr", "shown_noise", "width_from", "windows_near"):
+    for name in ("lag_samples", "lag_stderr", "lag_untold", "shown_noise", "width_from", "windows_near"):
         settings.pop(name, None)
     kinds = dict(settings["kinds"])
     for name, kind in kinds.items():

@@ -23,7 +23,7 @@ RecordIndex: TypeAlias = (
 )
 """What stands for records of a batch, as in NumPy's indexing."""
 
-_LISTS = ("lag_samples", "shown_noise")
+_LISTS = ("lag_samples", "lag_untold", "shown_noise")
 _ONE_EACH = (
     "window_length",
     "exponent",

@@ -193,6 +193,8 @@ pub(crate) struct Identification {
     mostly_noise: bool,
     unexplained: bool,
     lag: Option<Estimate>,
+    /// Samples of it that are not told beyond that, which errors hold: the search for it did not settle.
+    untold_lag: f64,
     angle_zero: Option<Estimate>,
     /// Where an offset that is free in every window predicts better.
     free_offset: Option<OffsetErrors>,
@@ -267,6 +269,7 @@ impl Identification {
             weakest: weak.map(|weak| weak.weakest.clone()).unwrap_or_default(),
             mostly_noise: weak.is_some_and(|weak| weak.mostly_noise),
             unexplained: weak.is_some_and(|weak| weak.unexplained),
+            untold_lag: weak.map_or(0.0, |weak| weak.untold_lag),
             lag: weak.and_then(|weak| weak.lag).map(|lag| Estimate { value: lag.value, stderr: lag.error }),
             angle_zero: weak
                 .and_then(|weak| weak.angle_zero)

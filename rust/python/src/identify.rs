@@ -31,7 +31,7 @@ pub(crate) struct WeakForm {
 #[pymethods]
 impl WeakForm {
     #[new]
-    #[pyo3(signature = (window_length, exponent, regression_window, *, averaging=true, linear=true, noise=(None, None), shown_noise=None, tested=None, near=None, width_from=None, found_lag=false))]
+    #[pyo3(signature = (window_length, exponent, regression_window, *, averaging=true, linear=true, noise=(None, None), shown_noise=None, tested=None, near=None, width_from=None, found_lag=None))]
     fn new(
         window_length: Vec<Option<usize>>,
         exponent: Vec<Option<usize>>,
@@ -43,7 +43,7 @@ impl WeakForm {
         tested: Option<Vec<usize>>,
         near: Option<Vec<Option<usize>>>,
         width_from: Option<Vec<Option<String>>>,
-        found_lag: bool,
+        found_lag: Option<Vec<f64>>,
     ) -> Self {
         let each = window_length.into_iter().zip(exponent).zip(regression_window).enumerate();
         let settings = each.map(|(record, ((window_length, exponent), regression_window))| Weak {
@@ -58,7 +58,7 @@ impl WeakForm {
                 tested: tested.clone().unwrap_or_default(),
                 near: near.as_ref().and_then(|each| each.get(record).copied().flatten()),
                 width_from: width_from.as_ref().and_then(|each| width_from_named(each.get(record)?.as_deref()?)),
-                found_lag,
+                found_lag: found_lag.as_ref().map(|each| each.get(record).copied().unwrap_or(0.0)),
             },
         });
         Self { settings: settings.collect() }

@@ -122,6 +122,7 @@ pub(crate) fn weak(
         mostly_noise: found.mostly_noise,
         unexplained: found.unexplained,
         lag: found.lag,
+        untold_lag: found.untold_lag,
         width_from: found.width_from,
         near: found.near,
         changing: found.changing.iter().map(|&one| place(one)).collect(),

@@ -109,6 +109,8 @@ pub struct WeakDetails {
     pub changing: Vec<usize>,
     /// The lag that was estimated; `None` if it was given or is not determined.
     pub lag: Option<Lag>,
+    /// Samples of a lag that are not told beyond that, which errors of the unknowns hold: the search for it did not settle.
+    pub untold_lag: f64,
     /// The angle at which the spring is relaxed, where a constant offset was contradicted and this predicts better.
     pub angle_zero: Option<AngleZero>,
     /// How much better an offset would predict that is free in every window, where the record contradicts a constant one.

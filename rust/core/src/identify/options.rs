@@ -60,8 +60,9 @@ pub struct Repeated {
     pub near: Option<usize>,
     /// Where the test function came from; `None` where it was given.
     pub width_from: Option<WidthFrom>,
-    /// Whether the lag that is given was found in the record, so that errors hold its own.
-    pub found_lag: bool,
+    /// Where the lag that is given was found in the record, so that errors hold its own: the samples of it that were not told, as the search did not
+    /// settle.
+    pub found_lag: Option<f64>,
 }
 
 impl Default for WeakForm {

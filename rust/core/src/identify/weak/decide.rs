@@ -133,6 +133,7 @@ impl Session<'_, '_, '_> {
             expected,
             constants_jump: false,
             jumps: Vec::new(),
+            untold_lag: 0.0,
             whole: None,
             spring: None,
             white: None,

@@ -51,6 +51,8 @@ pub(crate) struct Decided {
     pub(crate) constants_jump: bool,
     /// Jumps of windowed coefficients and of constants.
     pub(crate) jumps: Vec<Jump>,
+    /// Samples by which the torque may be later or earlier than it is taken to be, beyond what the equations tell: a search for its lag did not settle.
+    pub(crate) untold_lag: f64,
     /// All rows, also those over jumps; nothing without jumps.
     pub(crate) whole: Option<Rows>,
     /// The stiffness as a regressor, which is the last of the constants, where the spring's zero is sought.

@@ -53,6 +53,8 @@ pub(crate) struct WeakIdentified {
     pub(crate) suspects: Vec<Suspect>,
     /// The estimated lag, or `None` if it was given or is not determined.
     pub(crate) lag: Option<Lag>,
+    /// Samples of it that are not told beyond its error beside what the equations hold: the search for it did not settle.
+    pub(crate) untold_lag: f64,
     /// Which channel is filtered by more than the lag explains, and by which part of them constants may be wrong by that, if one is.
     pub(crate) filtered: Option<(usize, f64)>,
     /// The angle at which the spring is relaxed, or `None` if it was not needed.

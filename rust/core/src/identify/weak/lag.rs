@@ -12,7 +12,6 @@ use crate::identify::kinds::Kind;
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decide::BADLY;
 use crate::identify::weak::decided::Decided;
-use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::{CONSPICUOUS, JudgedTerm};
 use crate::inference::slowly_varying::{followed, without};
@@ -20,7 +19,6 @@ use crate::noise::median::median;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
-use crate::regression::problem::Problem;
 use crate::weak_form::test_function::TestFunction;
 use crate::weak_form::test_function_choice::spectrum_length;
 use crate::weak_form::weak_rows::WeakRows;
@@ -38,7 +36,7 @@ const MOST_OF_A_MOVE: f64 = 0.9;
 /// The least part of the lag that a step may be taken to cover, where noise of the rate hides the rest.
 const LEAST_RESPONSE: f64 = 0.05;
 /// A lag that is not known to this part of the test function's half-width is not determined: beyond it the rate is no line.
-const UNKNOWN: f64 = 0.5;
+pub(crate) const UNKNOWN: f64 = 0.5;
 
 /// A lag beside constants is known well enough to begin with from a step of so many samples on, and is at most so many half-widths. It is large from
 /// this part of the half-width that was chosen without it.
@@ -105,7 +103,7 @@ impl Creeping {
 impl Session<'_, '_, '_> {
     /// Decides what is constant with the test function that was chosen, finds the lag where it is not given, and chooses again with it.
     pub(crate) fn decide_and_choose_again(&mut self, mut chosen: Chosen, model: &Model) -> Result<Settled, Error> {
-        let (mut lag, mut without, mut last, mut raised) = (None, None, None, 1.0);
+        let (mut lag, mut without, mut last, mut raised, mut untold) = (None, None, None, 1.0, 0.0);
         if let Some(about) = self.large_lag(&chosen)? {
             self.record.lag = about;
             chosen = self.choose(model)?;
@@ -120,6 +118,7 @@ impl Session<'_, '_, '_> {
                 without = Some((chosen.clone(), decided.clone(), (self.scan.clone(), self.suggested, self.noise)));
             }
             (chosen, decided) = self.between_jumps_of_suggested(chosen, decided, model)?;
+            decided.untold_lag = self.options.found_lag.unwrap_or(0.0);
             if self.options.lag.is_some() || self.varies_too_much(&decided) {
                 return Ok((chosen, decided, None));
             }
@@ -127,8 +126,12 @@ impl Session<'_, '_, '_> {
                 (chosen, decided) = self.constant_beside_lag((chosen, decided), model)?;
             }
             let before = self.record.lag;
+            let earlier: Option<Lag> = lag;
             lag = self.find_lag(&chosen, &decided)?;
-            let Some(found) = lag else { break };
+            let Some(found) = lag else {
+                untold = earlier.map_or(0.0, |lag| lag.value.hypot(lag.error));
+                break;
+            };
             let moved = found.value - before;
             let settled = moved.abs() <= CHOSEN * found.error;
             if settled || choice == CHOICES {
@@ -137,10 +140,13 @@ impl Session<'_, '_, '_> {
                 let error = raised * if settled { found.error } else { found.error.hypot(moved) };
                 // What changes slowly and the lag make room for each other: a lag that does not settle, and may be none, is not determined.
                 if !settled && !decided.slow.is_empty() && before.abs() <= CONSPICUOUS * error {
-                    lag = None;
+                    let alike = last.filter(|(_, slow)| *slow == decided.slow);
+                    let more = alike.map_or(0.0, |(before, _)| still_to_come([before, moved]));
+                    (lag, untold) = (None, (found.value + more).hypot(error));
                     break;
                 }
                 self.record.lag = before;
+                decided.untold_lag = (error * error - found.error * found.error).max(0.0).sqrt();
                 return Ok((chosen, decided, Some(Lag { value: before, error })));
             }
             self.record.lag = found.value;
@@ -151,7 +157,7 @@ impl Session<'_, '_, '_> {
                 let (limit, error) = (found.value + creeps.left(), creeps.raised() * found.error);
                 if limit.abs() <= CONSPICUOUS * error && !creeps.settles_after(CHOICES - choice, found.error) {
                     // It will not settle, and may be none.
-                    lag = None;
+                    (lag, untold) = (None, limit.hypot(error));
                     break;
                 }
                 (self.record.lag, raised) = (limit, creeps.raised());
@@ -160,12 +166,14 @@ impl Session<'_, '_, '_> {
             }
         }
         self.record.lag = 0.0;
-        if let Some((chosen, decided, (scan, suggested, noise))) = without {
+        if let Some((chosen, mut decided, (scan, suggested, noise))) = without {
             (self.scan, self.suggested, self.noise) = (scan, suggested, noise);
+            decided.untold_lag = untold;
             return Ok((chosen, decided, lag));
         }
         let mut chosen = self.choose(model)?;
-        let decided = self.decide(&mut chosen, model)?;
+        let mut decided = self.decide(&mut chosen, model)?;
+        decided.untold_lag = untold;
         Ok((chosen, decided, lag))
     }
 
@@ -354,44 +362,15 @@ impl Session<'_, '_, '_> {
     }
 
     /// Which regressor the torque's rate is.
-    fn rate(&self) -> usize {
+    pub(crate) fn rate(&self) -> usize {
         3 + self.record.terms.len()
     }
+}
 
-    /// The covariance of the constants of a model together with the lag, or `None` if the lag was not estimated.
-    pub(crate) fn covariance_beside_lag(
-        &mut self,
-        problem: &Problem<'_>,
-        weak: &WeakRows,
-        decided: &Decided,
-        fit: &Fit,
-        errors: &Errors,
-    ) -> Result<Option<Vec<f64>>, Error> {
-        if !self.finds_lag() {
-            return Ok(None);
-        }
-        let (mut model, mut rows) = (decided.ordered(), decided.rows(&weak.rows).clone());
-        let wanted = model.constant.len();
-        let rhs = decided.rhs(&rows).to_vec();
-        let rate = self.rate();
-        let followed = self.beside_slow(&rows, &rows.regressors[rate].value, decided)?;
-        let Some(Followed { left, by }) = followed else { return Ok(None) };
-        rows.regressors[rate].value = left;
-        model.constant.push(rate);
-        let problem = model.problem(&rows, &rhs, self.noise[0], problem.correlated.as_ref());
-        let Some(all) = fit.again(&problem, errors.expected, self.options.instructions, &mut self.stages)? else {
-            return Ok(None);
-        };
-        let both = all.covariance(&problem, &errors.covariance, &mut self.stages)?;
-        // What varies slowly follows the lag, too.
-        let count = wanted + 1;
-        let follows = |one: usize| by.get(one).copied().unwrap_or(0.0);
-        let with_lag = |one: usize| both[one * count + wanted] - follows(one) * both[count * count - 1];
-        let entry = |one: usize, other: usize| {
-            both[one * count + other] - follows(one) * both[other * count + wanted] - follows(other) * with_lag(one)
-        };
-        Ok(Some((0..wanted * wanted).map(|place| entry(place / wanted, place % wanted)).collect()))
-    }
+/// What moves of a lag will add up to that go on as these two, each the same part of the one before; nothing if they do not become smaller.
+fn still_to_come([before, moved]: [f64; 2]) -> f64 {
+    let part = moved / before;
+    if part > 0.0 && part < 1.0 { moved * part / (1.0 - part) } else { 0.0 }
 }
 
 /// Adds regressors times powers of time to rows, from the middle of the record on, and returns which they are.
@@ -424,5 +403,7 @@ mod tests {
         for other in [[0.8, -0.4], [0.8, 0.8], [0.4, 0.8], [0.0, 0.1], [0.0, 0.0], [1.0, 0.0]] {
             assert!(Creeping::new(other).is_none(), "{other:?}");
         }
+        // However slowly they become smaller.
+        assert!((still_to_come([1.0, 0.99]) - 99.0).abs() < 1e-9 && still_to_come([1.0, 1.0]) == 0.0);
     }
 }

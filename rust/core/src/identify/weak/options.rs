@@ -34,8 +34,8 @@ pub(crate) struct WeakOptions {
     pub(crate) shown_noise: Option<f64>,
     /// By how many samples the torque comes late; estimated where not given.
     pub(crate) lag: Option<f64>,
-    /// Whether a lag that is given was found in the record.
-    pub(crate) found_lag: bool,
+    /// Samples of a lag that is given which were not told where it was found in the record; nothing where it was not.
+    pub(crate) found_lag: Option<f64>,
     /// Samples of the windows near which lengths are compared first, where an identification that this one repeats did so.
     pub(crate) near: Option<usize>,
     /// Where a test function that is given came from, if the record chose it.

@@ -115,7 +115,7 @@ impl Session<'_, '_, '_> {
 
     /// Whether the lag of the torque is found in the record, here or by an identification that this one repeats.
     pub(crate) fn finds_lag(&self) -> bool {
-        self.options.lag.is_none() || self.options.found_lag
+        self.options.lag.is_none() || self.options.found_lag.is_some()
     }
 
     pub(crate) fn model(&self) -> Model {

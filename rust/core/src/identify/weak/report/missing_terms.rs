@@ -105,7 +105,7 @@ impl Session<'_, '_, '_> {
         let RowsToJudge { mut weak, mut rhs, first, end, followed, are_some } =
             self.rows_to_judge(all, decided, fit, &candidates)?;
         // What the torque tells is told beside a lag that may be missing, not beside one that was found; another record's may be another.
-        let found_lag = usize::from(self.options.found_lag && candidates.last() == Some(&Missing::Lag));
+        let found_lag = usize::from(self.options.found_lag.is_some() && candidates.last() == Some(&Missing::Lag));
         let apart = candidates.iter().take_while(|missing| !missing.is_beside_torque()).count();
         let mut suspects = Vec::new();
         if !is_explained {

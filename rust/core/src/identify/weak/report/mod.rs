@@ -1,6 +1,7 @@
 //! The report of one record after all decisions.
 
 pub(crate) mod at_rows;
+pub(crate) mod beside_lag;
 pub(crate) mod errors;
 pub(crate) mod explained;
 pub(crate) mod filter;

@@ -10,9 +10,10 @@ use crate::identify::scanned::Scan;
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::found::WeakIdentified;
-use crate::identify::weak::lag::Lag;
+use crate::identify::weak::lag::{Lag, UNKNOWN};
 use crate::identify::weak::outside_mask::Inside;
 use crate::identify::weak::report::at_rows::{Fitted, OfAllRows};
+use crate::identify::weak::report::beside_lag::BesideLag;
 use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::report::explained::Explained;
 use crate::identify::weak::report::filter::{LEAST_CHANGE, LeftOfFilter};
@@ -38,12 +39,11 @@ impl Session<'_, '_, '_> {
         told: Option<&Scan>,
     ) -> Result<(WeakIdentified, Option<RowResults>), Error> {
         let Chosen { weak, at_end, .. } = chosen;
-        let stride = weak.stride;
         let ordered = decided.ordered();
         let mut found = WeakIdentified { width_from: self.width_from(at_end), ..self.nothing_yet(&weak, decided) };
         let Some(fit) = &decided.fit else { return Ok((self.undetermined(found, decided)?, None)) };
         let given = self.options.regression_window.filter(|_| !self.options.averaging);
-        found.regression_window = given.unwrap_or(fit.span * stride).min(self.record.angle.len());
+        found.regression_window = given.unwrap_or(fit.span * weak.stride).min(self.record.angle.len());
         let errors = self.errors(&weak, decided, fit)?;
         let explained = self.is_explained(&weak, decided, fit, errors.left)?;
         found.prediction_error = errors.over_channels;
@@ -57,8 +57,10 @@ impl Session<'_, '_, '_> {
         let Some(all) = all.as_deref() else { return Ok((self.undetermined(found, decided)?, None)) };
         found.condition = all.pooled.condition;
         found.weakest = weakest(&all.full, &all.pooled.weights);
-        let (covariance, left) = self.covariance_of(&problem, &weak, decided, (fit, all), &errors)?;
-        let mut changes: Vec<&[f64]> = left.iter().map(|left| left.changes.as_slice()).collect();
+        let BesideLag { covariance, untold } = self.covariance_of(&problem, &weak, decided, (fit, all), &errors)?;
+        let left = self.left_of_filter(&weak, decided, fit, &errors)?;
+        let mut changes = changes_of(untold.as_deref(), left.as_ref());
+        let first = changes.len();
         found.covariance = with_changes(covariance, &changes);
 
         let (slow, count) = (decided.slow.len(), ordered.constant.len());
@@ -77,7 +79,7 @@ impl Session<'_, '_, '_> {
         // Where widths of the test function contradict the constants, these errors would only hide it.
         if widths.status(&found.constants) == Status::GOOD {
             changes.extend(suspected.changes.iter().chain(&apart).map(Vec::as_slice));
-            found.covariance = with_changes(found.covariance, &changes[left.iter().len()..]);
+            found.covariance = with_changes(found.covariance, &changes[first..]);
             found.constants = constants(decided, &values, &found.covariance);
         }
         found.constant_pairs = pairs_of(&ordered.constant, slow, &found.covariance);
@@ -97,8 +99,7 @@ impl Session<'_, '_, '_> {
                 inflation: errors.inflation,
             },
         )?;
-        let usable = &decided.whole.as_ref().unwrap_or(&weak.rows).usable;
-        tracks.mark(usable, outside.as_ref());
+        tracks.mark(&decided.whole.as_ref().unwrap_or(&weak.rows).usable, outside.as_ref());
         found.outside_mask = outside;
         let fitted = Fitted {
             weak: &weak,
@@ -119,25 +120,6 @@ impl Session<'_, '_, '_> {
         found.record_status = errors.status | record_status(&found, &results, decided, at_end);
         found.record_status |= if contradicted { Status::KIND_CONTRADICTED } else { Status::GOOD };
         Ok((found, Some(results)))
-    }
-
-    /// The covariance of the constants from the noise, and what a lag leaves of a filter, if it does leave something.
-    fn covariance_of(
-        &mut self,
-        problem: &Problem<'_>,
-        weak: &WeakRows,
-        decided: &Decided,
-        (fit, all): (&Fit, &Fit),
-        errors: &Errors,
-    ) -> Result<(Vec<f64>, Option<LeftOfFilter>), Error> {
-        let mut covariance = match self.covariance_beside_lag(problem, weak, decided, fit, errors)? {
-            Some(covariance) => covariance,
-            None => all.covariance(problem, &errors.covariance, &mut self.stages)?,
-        };
-        for entry in &mut covariance {
-            *entry *= errors.inflation;
-        }
-        Ok((covariance, self.left_of_filter(weak, decided, fit, errors)?))
     }
 
     /// Whether a constant differs between parts of the record. An offset that drifts by next to nothing of the torque, as noise of low
@@ -196,6 +178,7 @@ impl Session<'_, '_, '_> {
             with_lag: Vec::new(),
             suspects: Vec::new(),
             lag: None,
+            untold_lag: decided.untold_lag.min(UNKNOWN * weak.function.half_width() as f64),
             filtered: None,
             angle_zero: None,
             free_offset: self.free_offset,
@@ -244,6 +227,11 @@ impl Session<'_, '_, '_> {
         found.results = SampleResults::undetermined(found.changing.len(), elements, &mut self.stages)?;
         Ok(found)
     }
+}
+
+/// What the constants may be wrong by with what is not told of a lag, and with a filter.
+fn changes_of<'a>(untold: Option<&'a [f64]>, left: Option<&'a LeftOfFilter>) -> Vec<&'a [f64]> {
+    untold.into_iter().chain(left.map(|left| left.changes.as_slice())).collect()
 }
 
 /// The covariance of the constants, with what they may be wrong by.

@@ -1,0 +1,84 @@
+//! The covariance of constants beside a lag that was sought, and what they may be wrong by where the search did not settle.
+
+use crate::error::Error;
+use crate::identify::weak::decided::Decided;
+use crate::identify::weak::lag::{Followed, UNKNOWN};
+use crate::identify::weak::report::errors::Errors;
+use crate::identify::weak::session::Session;
+use crate::regression::fit::Fit;
+use crate::regression::problem::Problem;
+use crate::weak_form::weak_rows::WeakRows;
+
+/// Constants, those that change slowly first, beside a lag.
+pub(crate) struct BesideLag {
+    /// Their covariance.
+    pub(crate) covariance: Vec<f64>,
+    /// What all of them change by with what is not told of the lag; nothing where it is told.
+    pub(crate) untold: Option<Vec<f64>>,
+}
+
+impl Session<'_, '_, '_> {
+    /// The covariance of the constants from the noise, beside a lag if one was sought.
+    pub(crate) fn covariance_of(
+        &mut self,
+        problem: &Problem<'_>,
+        weak: &WeakRows,
+        decided: &Decided,
+        (fit, all): (&Fit, &Fit),
+        errors: &Errors,
+    ) -> Result<BesideLag, Error> {
+        let mut found = match self.beside_lag(problem, weak, decided, fit, errors)? {
+            Some(found) => found,
+            None => {
+                BesideLag { covariance: all.covariance(problem, &errors.covariance, &mut self.stages)?, untold: None }
+            }
+        };
+        for entry in &mut found.covariance {
+            *entry *= errors.inflation;
+        }
+        Ok(found)
+    }
+
+    /// The same beside a lag, or `None` if none was sought or all is not determined beside it.
+    fn beside_lag(
+        &mut self,
+        problem: &Problem<'_>,
+        weak: &WeakRows,
+        decided: &Decided,
+        fit: &Fit,
+        errors: &Errors,
+    ) -> Result<Option<BesideLag>, Error> {
+        if !self.finds_lag() {
+            return Ok(None);
+        }
+        let (mut model, mut rows) = (decided.ordered(), decided.rows(&weak.rows).clone());
+        let wanted = model.constant.len();
+        let rhs = decided.rhs(&rows).to_vec();
+        let rate = self.rate();
+        let followed = self.beside_slow(&rows, &rows.regressors[rate].value, decided)?;
+        let Some(Followed { left, by }) = followed else { return Ok(None) };
+        rows.regressors[rate].value = left;
+        model.constant.push(rate);
+        let problem = model.problem(&rows, &rhs, self.noise[0], problem.correlated.as_ref());
+        let Some(all) = fit.again(&problem, errors.expected, self.options.instructions, &mut self.stages)? else {
+            return Ok(None);
+        };
+        let both = all.covariance(&problem, &errors.covariance, &mut self.stages)?;
+        // What varies slowly follows the lag, too.
+        let count = wanted + 1;
+        let follows = |one: usize| by.get(one).copied().unwrap_or(0.0);
+        let with_lag = |one: usize| both[one * count + wanted] - follows(one) * both[count * count - 1];
+        let entry = |one: usize, other: usize| {
+            both[one * count + other] - follows(one) * both[other * count + wanted] - follows(other) * with_lag(one)
+        };
+        let covariance = (0..wanted * wanted).map(|place| entry(place / wanted, place % wanted)).collect();
+        let with_rate = &all.pooled.inverse[wanted * count..];
+        // Beyond it the rate is no line.
+        let most = UNKNOWN * weak.function.half_width() as f64;
+        let seconds = decided.untold_lag.min(most) * self.options.delta;
+        let change = |one: usize| seconds * (with_rate[one] / with_rate[wanted] - follows(one));
+        let changes: Vec<f64> = (0..wanted).map(change).collect();
+        let untold = Some(changes).filter(|all| seconds > 0.0 && all.iter().all(|one| one.is_finite()));
+        Ok(Some(BesideLag { covariance, untold }))
+    }
+}
