@@ -215,6 +215,9 @@ def test_what_swings_is_seen_where_nearly_every_row_is_beyond_what_counts(
         true, trusted = getattr(rig, one), result.trusted
         assert np.sqrt(np.mean((getattr(result, one)[trusted] / true[trusted] - 1) ** 2)) < 0.05
     assert np.mean(result.trusted) > 0.9
+    again = tvident.identify(rig.angle, rig.torque, sample_rate=500, settings=result.settings)
+    for one in (*names, "stiffness"):
+        np.testing.assert_array_equal(getattr(again, one), getattr(result, one))
 
 
 @pytest.mark.parametrize("missing", ["coulomb", "late"])
