@@ -47,15 +47,13 @@ impl Session<'_, '_, '_> {
         let is_open = undecided.contains(&swinging);
         let rows = if is_open { Cow::Borrowed(rows) } else { Cow::Owned(without_rate(rows, swinging)) };
         let all = Some(undecided).filter(|all| is_open && all.len() > 1 && is_lost(decided));
-        let mut beside_all = None;
+        let (mut beside_all, mut by_usual) = (None, is_lost(decided));
         if let Some(all) = all {
-            let (free, left) = self.freed_with_left(&rows, model, decided, &all)?;
-            if left >= UNLIKE_ALL {
-                return Ok(false);
-            }
+            let (free, left) = self.freed_with_left(&rows, model, decided, (&all, true))?;
+            by_usual = left < UNLIKE_ALL;
             beside_all = free.filter(|_| left < LEFT_BESIDE_ALL);
         }
-        let (alone, left) = self.freed_with_left(&rows, model, decided, &[swinging])?;
+        let (alone, left) = self.freed_with_left(&rows, model, decided, (&[swinging], by_usual))?;
         let Some(free) = alone.filter(|_| left < LEFT_BESIDE_ONE).or(beside_all) else { return Ok(false) };
         if is_open {
             *decided = free;
@@ -74,34 +72,30 @@ impl Session<'_, '_, '_> {
         Ok(swinging(&problem, (fit, &may), noise, instructions, &mut self.stages)?.into_iter().next())
     }
 
-    /// What a record is with some constants set free, unless that is hopeless, and the part that is left of what noise does not explain: none or all of it,
-    /// unless rows are predicted worst.
+    /// What a record is with some constants set free, unless that is hopeless, and the part that is left of what noise does not explain: none or all of it by
+    /// the error of predicting rows, which one alone may be judged by, or of the usual square.
     fn freed_with_left(
         &mut self,
         rows: &Rows,
         model: &Model,
         decided: &Decided,
-        constants: &[usize],
+        (constants, by_usual): (&[usize], bool),
     ) -> Result<(Option<Decided>, f64), Error> {
-        if self.is_hopeless(rows, model, decided, constants)? {
+        if self.is_hopeless(rows, model, decided, (constants, by_usual))? {
             return Ok((None, f64::INFINITY));
         }
         let excess = (decided.error - 1.0).max(0.0);
-        let hopeless = if is_lost(decided) { f64::INFINITY } else { 1.0 + HOPELESS * excess };
+        let hopeless = if by_usual { f64::INFINITY } else { 1.0 + HOPELESS * excess };
         let free = self.freed(rows, model, decided, (constants, hopeless))?;
-        let is_settled = if is_lost(decided) {
-            is_of_a_machine(&free)
+        let is_settled = free.error - 1.0 < LEFT_OF_SWINGS * excess && free.error < A_LITTLE_BETTER * decided.error;
+        let left = if constants.len() == 1 && is_settled {
+            0.0
+        } else if by_usual && is_of_a_machine(&free) {
+            let problems = [decided, &free].map(|one| (one.problem(rows, self.noise[0]), one.fit.as_ref()));
+            let [before, after] = problems.map(|(problem, fit)| self.usual_left(&problem, fit));
+            after? / before?
         } else {
-            free.error - 1.0 < LEFT_OF_SWINGS * excess && free.error < A_LITTLE_BETTER * decided.error
-        };
-        let left = match (is_settled, is_lost(decided)) {
-            (false, _) => 1.0,
-            (true, false) => 0.0,
-            (true, true) => {
-                let problems = [decided, &free].map(|one| (one.problem(rows, self.noise[0]), one.fit.as_ref()));
-                let [before, after] = problems.map(|(problem, fit)| self.usual_left(&problem, fit));
-                after? / before?
-            }
+            f64::INFINITY
         };
         Ok((Some(free), left))
     }
@@ -120,21 +114,21 @@ impl Session<'_, '_, '_> {
         rows: &Rows,
         model: &Model,
         decided: &Decided,
-        constants: &[usize],
+        (constants, by_usual): (&[usize], bool),
     ) -> Result<bool, Error> {
         let (Some(stretches), Some(first)) = (stretches_of_rows(rows.len()), decided.first) else { return Ok(false) };
         let length = stretches.first().map_or(0, Range::len);
         let is_short = |scale: &Scale| scale.span() * slowly_varying::STRETCH <= length;
         let scales: Vec<Scale> = decided.scales.iter().copied().filter(|&scale| holds(scale)).collect();
         // Where most squares are beyond the largest that counts, no length was chosen by them.
-        let others = || scales.iter().rev().copied().find(is_short).filter(|_| is_lost(decided));
+        let others = || scales.iter().rev().copied().find(is_short).filter(|_| by_usual);
         let Some(first) = Some(first).filter(is_short).or_else(others) else { return Ok(false) };
         let some = thinned_rows(rows, &stretches);
         let (noise, expected, instructions) = (self.noise[0], decided.expected, self.options.instructions);
         let problem = decided.model.problem(&some, &some.rhs, noise, None);
         let before = best_length(&problem, (&scales, &[first]), expected, instructions, &mut self.stages)?;
         let Some((scale, error)) = before else { return Ok(false) };
-        let before = self.unexplained(&problem, (scale, error), decided)?;
+        let before = self.unexplained(&problem, (scale, error), (decided, by_usual))?;
         let rest: Vec<usize> = decided.model.constant.iter().copied().filter(|one| !constants.contains(one)).collect();
         let ordered = Model { constant: [constants, &rest].concat(), ..model.clone() };
         let rest = Model { constant: rest, ..model.clone() };
@@ -152,22 +146,21 @@ impl Session<'_, '_, '_> {
             let found = slowly_varying::find(&SlowSearch { breaks, ..search }, first, &mut self.stages)?;
             let Some(found) = found else { return Ok(false) };
             let problem = rest.problem(&some, &found.rhs, noise, None);
-            if self.unexplained(&problem, (found.scale, found.error), decided)? <= HOPELESS * before {
+            if self.unexplained(&problem, (found.scale, found.error), (decided, by_usual))? <= HOPELESS * before {
                 return Ok(false);
             }
         }
         Ok(true)
     }
 
-    /// What windows of a length, which predict with some error, leave of some rows that noise does not explain; the usual square where most are beyond the
-    /// largest that counts.
+    /// What windows of a length, which predict with some error, leave of some rows that noise does not explain, or the usual square.
     fn unexplained(
         &mut self,
         problem: &Problem<'_>,
         (scale, error): (Scale, f64),
-        decided: &Decided,
+        (decided, by_usual): (&Decided, bool),
     ) -> Result<f64, Error> {
-        if !is_lost(decided) {
+        if !by_usual {
             return Ok(error - 1.0);
         }
         let (expected, instructions) = (decided.expected, self.options.instructions);
