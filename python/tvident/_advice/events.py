@@ -16,6 +16,12 @@ from tvident._status import Status, stretches_of, untold_samples
 _SHOWN = 6
 """Pulses that are listed at most."""
 
+_APART = (
+    "windows over such a place are wrong in strong form: exclude half a window on either side with mask=, give the parts as a list of "
+    "records, or use method='auto', which leaves such equations out"
+)
+"""What to do about places at which the angle jumps."""
+
 _TREATED = (
     ("angle", "what their neighbours say took their place"),
     ("torque", "equations with them were left out"),
@@ -26,8 +32,8 @@ _TREATED = (
 def lost_samples(found: _core.Identification) -> list[str]:
     """Return at how many places samples seem to be lost."""
     return [
-        f"the angle jumps between two samples at {one.amount:.0f} place{'' if one.amount == 1 else 's'}, as it does where samples are "
-        "lost: equations over such a place were left out; if a recorder loses samples, record their times"
+        f"{_between_samples(round(one.amount), 'angle')}: equations over such a place were left out; if a recorder loses samples, record "
+        "their times"
         for one in found.defects
         if one.name == "broken"
     ]
@@ -75,14 +81,27 @@ def without_numbers(
 
 
 def events_that_stay(angles: npt.NDArray[np.number], torques: npt.NDArray[np.number]) -> list[tuple[int, str]]:
-    """Return what to do about readings that failed and about spikes, by record, where nothing took them out."""
+    """Return what to do about readings that failed, spikes and jumps, by record, where nothing took them out."""
+    make_nan = "make them NaN, or use method='auto', which takes them out"
+    looked_for = (
+        (_not_read, make_nan, _core.unread_counts),
+        (_out_of_neighbours, make_nan, _core.spike_counts),
+        (_between_samples, _APART, _core.break_counts),
+    )
     return [
-        (record, f"{words(count, name)}: make them NaN, or use method='auto', which takes them out")
-        for words, counted in ((_not_read, _core.unread_counts), (_out_of_neighbours, _core.spike_counts))
+        (record, f"{words(count, name)}: {cure}")
+        for words, cure, counted in looked_for
         for record, counts in enumerate(counted(angles, torques))
         for (name, _), count in zip(_TREATED, counts, strict=True)
         if count
     ]
+
+
+def _between_samples(count: int, name: str) -> str:
+    return (
+        f"the {name} jumps between two samples at {count} place{'' if count == 1 else 's'}, as it does where samples are lost or "
+        "recordings are joined"
+    )
 
 
 def _not_read(count: int, name: str) -> str:

@@ -17,9 +17,10 @@ from tvident._identify.data import Data, cut
 from tvident._identify.free_offset import without_worse_offset
 from tvident._identify.left_over import unexplained
 from tvident._identify.methods import StrongForm, WeakForm
-from tvident._identify.offered import BEYOND_CHANCE, NEXT_TO_NOTHING
+from tvident._identify.offered import BEYOND_CHANCE, NEXT_TO_NOTHING, contradicted
 from tvident._identify.remedies import Trial
 from tvident._identify.settings import Request, resolve
+from tvident._identify.tried_record import CONTRADICTED
 from tvident._identify.used import as_used
 from tvident._results import MARKED, TRIED, Identification, Words
 from tvident._status import Status
@@ -150,19 +151,32 @@ class _AskedOfRecord:
 class TriedInWeakForm(_AskedOfRecord):
     """A single record in strong form, of which the weak form tells what to change: its windows follow whatever is missing."""
 
-    def words(self, _: Identification, words: Words) -> Words:
-        """Return words that begin with what explains more in weak form, if anything does."""
+    def words(self, result: Identification, words: Words) -> Words:
+        """Return words that begin with what explains more in weak form, if anything does, or with what it finds elsewhere."""
         try:
-            advice = self._in_weak_form(self._part()).advice
+            weak = self._in_weak_form(self._part())
         except ValueError:
             # The part is too short for the weak form, or nothing of it is there.
             return words
-        remedy = next((line for line in advice if TRIED in line), None)
+        remedy = next((line for line in weak.advice if TRIED in line), None)
         if remedy is None:
-            return words
+            return self._unless_contradicted(result, weak, words)
         starts = tuple(beginning for one in BUILT_IN.values() for beginning in one.beginnings)
         rest = [line for line in words.advice if not (line.startswith(starts) and ": give terms=" in line)]
         return replace(words, advice=(f"in weak form: {remedy}", *rest))
+
+    def _unless_contradicted(self, strong: Identification, weak: Identification, words: Words) -> Words:
+        """Return words that begin with what the weak form finds elsewhere of a part of the record, where nothing contradicts it."""
+        # What a recorder spoilt is left out there, and said.
+        if weak.record_status & CONTRADICTED & ~Status.CHANNEL_SUSPECTED:
+            return words
+        begin, end = weak.time[[0, -1]].tolist()
+        unknown = [name for name in COEFFICIENTS if isinstance(self.given[name], str)]
+        elsewhere = contradicted(weak, strong.between(begin, end), unknown)
+        if elsewhere is None:
+            return words
+        rest = [line for line in words.advice if line not in weak.advice]
+        return replace(words, advice=(elsewhere, *weak.advice, *rest))
 
     def _part(self) -> slice:
         """Return the part of the record that is tried: its middle, or where the mask leaves most."""

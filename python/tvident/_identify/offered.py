@@ -10,7 +10,7 @@ import numpy as np
 
 from tvident._arguments import with_error
 from tvident._equation import BUILT_IN
-from tvident._results import BECOMES, Identification, median_of
+from tvident._results import BECOMES, OF_WEAK_FORM, Identification, median_of
 from tvident._status import DOUBTFUL_RECORD, Status
 
 BEYOND_CHANCE = 4.0
@@ -33,6 +33,12 @@ _ELSEWHERE = 3.0
 
 SUSPECTED = Status.TERM_SUSPECTED | Status.LAG_SUSPECTED
 """Flags of what may be missing."""
+
+_CONTRADICTS, _BY_WEAK_FORM = 4.0, 0.02
+"""Standard errors of both forms, and a share of the parameter, from which on the weak form contradicts the strong one.
+
+Of records whose parameters change smoothly the strong form is off by less than that, beside its standard errors.
+"""
 
 _AGAINST = 0.1
 """A share of a weight that a negative stiffness beside it may have: with more the two are distinguished by nothing."""
@@ -159,3 +165,32 @@ def moved(
             where = " and constant" + place if is_settled else place if kinds[name] != "constant" else ""
             words.append(f", {name}{BECOMES}{with_error(is_now, least)} {found.units[name]}{where}")
     return "".join(words)
+
+
+def contradicted(weak: Identification, strong: Identification, unknown: Sequence[str]) -> str | None:
+    """Return which parameters the weak form finds elsewhere with the same equation, in words; None where it finds the same.
+
+    Spikes, clipped samples and places at which parts are joined spoil every polynomial that holds one, and polynomials that are too smooth
+    take from the acceleration: the strong form shows none of that in its errors.
+
+    Parameters
+    ----------
+    weak : Identification
+        Of a part of a record; nothing contradicts it.
+    strong : Identification
+        Of the same samples.
+    unknown : sequence of str
+        What was not given.
+    """
+    words = []
+    for name in unknown:
+        (was, error), (value, least) = median_of(strong, name), median_of(weak, name)
+        if abs(value - was) > max(_CONTRADICTS * np.hypot(error, least), _BY_WEAK_FORM * abs(value)):
+            words.append(f"{name}{BECOMES}{with_error(value, least)} {weak.units[name]}")
+    if not words:
+        return None
+    begin, end = weak.time[[0, -1]].tolist()
+    return (
+        f"{OF_WEAK_FORM} at {begin:.4g}-{end:.4g} s, and nothing contradicts them: {', '.join(words)}: use method='auto', or find out "
+        "with result.scan() whether shorter windows agree"
+    )

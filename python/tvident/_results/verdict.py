@@ -13,7 +13,7 @@ import numpy as np
 from tvident import _core
 from tvident._arguments import explained_in_words, percent, percentiles, to_digits_of, told_once
 from tvident._results.torque import noise_of_compared
-from tvident._results.words import BECOMES, CONDITIONS, MARKED, OTHER_UNIT, TRIED
+from tvident._results.words import BECOMES, CONDITIONS, MARKED, OF_WEAK_FORM, OTHER_UNIT, TRIED
 from tvident._status import Status
 from tvident._units import in_words_of
 
@@ -114,11 +114,14 @@ def found_marked(advice: Sequence[str]) -> str | None:
 
 
 def _found_elsewhere(advice: Sequence[str]) -> str | None:
-    """Return which parameters an equation that explains more finds elsewhere, in words."""
+    """Return which parameters an equation that explains more, or the weak form, finds elsewhere, in words."""
     names = [name for name in _SYMBOLS if any(f" {name}{BECOMES}" in line for line in advice)]
     if not names:
         return None
-    return f"another equation explains more, and finds another {' and another '.join(names)}"
+    others = f"finds another {' and another '.join(names)}"
+    if any(line.startswith(OF_WEAK_FORM) for line in advice):
+        return f"the weak form {others}"
+    return f"another equation explains more, and {others}"
 
 
 def verdict_of_distrusted(result: Any, reason: str) -> str:

@@ -11,6 +11,9 @@ TRIED = "of what is held back are predicted"
 BECOMES = " becomes "
 """Between a parameter and the value that a better equation gives it, in advice."""
 
+OF_WEAK_FORM = "the weak form finds other numbers"
+"""How advice begins where the strong form is contradicted, with the same equation."""
+
 OTHER_UNIT = ("degrees?", "is the time in ")
 """How advice asks about units, of which all numbers depend."""
 

@@ -58,7 +58,8 @@ mod _core {
     use crate::motions::Motions;
     #[pymodule_export]
     use crate::noise::{
-        Noise, fuse, noise, noise_coherence, parts_of_quantisation, quantisation_step, spike_counts, unread_counts,
+        Noise, break_counts, fuse, noise, noise_coherence, parts_of_quantisation, quantisation_step, spike_counts,
+        unread_counts,
     };
     #[pymodule_export]
     use crate::respond::{Responses, respond};

@@ -6,8 +6,9 @@ use pyo3::prelude::*;
 use tvident::Error;
 use tvident::exec::Watch;
 use tvident::noise::{
-    Beside, fuse as core_fuse, noise as core_noise, noise_after, noise_coherence as core_coherence,
-    quantisation_step as core_step, searched, spike_counts as core_spike_counts, unread_counts as core_unread_counts,
+    Beside, break_counts as core_break_counts, fuse as core_fuse, noise as core_noise, noise_after,
+    noise_coherence as core_coherence, quantisation_step as core_step, searched, spike_counts as core_spike_counts,
+    unread_counts as core_unread_counts,
 };
 use tvident::record::Samples;
 use tvident::simd::Instructions;
@@ -145,6 +146,15 @@ pub(crate) fn noise_coherence(
         Ok::<(), Error>(())
     })?;
     Ok(found)
+}
+
+/// At how many places the angle of every record jumps between two samples; none of the torque.
+#[pyfunction]
+pub(crate) fn break_counts(
+    angle: &Bound<'_, PyUntypedArray>,
+    torque: &Bound<'_, PyUntypedArray>,
+) -> PyResult<Vec<[usize; 2]>> {
+    counted(angle, torque, core_break_counts)
 }
 
 /// How many samples of the angle and of the torque of every record stand far out of calm neighbours.

@@ -19,6 +19,7 @@ pub(crate) mod transform;
 pub(crate) mod unread;
 pub(crate) mod walk;
 
+pub use breaks::search::break_counts;
 pub use channel::{FEWEST_SAMPLES, noise, noise_after, variance_after};
 pub use coherence::{CORRELATED_NOISE, noise_coherence};
 pub use colour::coloured_noise;
