@@ -17,6 +17,7 @@ from tvident._arguments.labelled import check_against_labels, cure_by_labels, im
 from tvident._arguments.labels import Labels, labels_in, labels_of, labels_out
 from tvident._arguments.lost import check_no_lost_samples
 from tvident._arguments.marks import CLOSE_TO_MARK, marks_in
+from tvident._arguments.needed import called_as
 from tvident._arguments.numbers import (
     LARGEST,
     finite_number,
@@ -74,6 +75,7 @@ __all__ = [
     "any_array",
     "as_record",
     "begin_of",
+    "called_as",
     "channel",
     "channels",
     "check_against_labels",

@@ -29,6 +29,7 @@ _CANDIDATES: dict[str, dict[str, Any]] = {
 }
 
 
+@arguments.called_as("compare_models(angle, torque, sample_rate=1000)")
 def compare_models(
     angle: npt.ArrayLike,
     torque: npt.ArrayLike,

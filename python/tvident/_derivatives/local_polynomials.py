@@ -30,6 +30,7 @@ from tvident._tables import shaped
 
 
 # All but the data are options, as users call it.
+@arguments.called_as("fit_local_polynomials(y, 201, sample_rate=1000)")
 def fit_local_polynomials(
     y: npt.ArrayLike,
     window_length: int | str,

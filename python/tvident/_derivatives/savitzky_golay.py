@@ -37,6 +37,7 @@ _INSIDE: dict[str, Callable[[npt.NDArray[np.intp], int], npt.NDArray[np.intp]]] 
 
 
 # SciPy's parameters.
+@arguments.called_as("savgol_filter(x, 51, 3)")
 def savgol_filter(
     x: npt.ArrayLike,
     window_length: int,

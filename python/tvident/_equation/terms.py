@@ -16,6 +16,7 @@ from tvident._equation.names import name_of_term
 from tvident._expansion import Expansion
 
 
+@arguments.called_as("Term('drag', lambda t, angle, velocity: velocity * abs(velocity))")
 @dataclass(frozen=True)
 class Term:
     """A user-defined term on the left-hand side of the equation of motion, with an unknown factor.

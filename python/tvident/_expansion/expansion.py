@@ -31,6 +31,7 @@ _SHOWN = 6
 _TWO = 2
 
 
+@arguments.called_as("Expansion('bspline', of=position)")
 @dataclass(frozen=True)
 class Expansion:
     """A parameter as a sum of given functions with unknown factors: of time, or of a recorded channel.

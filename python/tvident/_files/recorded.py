@@ -63,6 +63,7 @@ def increasing_times(channels: Mapping[str, npt.NDArray[Any]]) -> list[str]:
     return found
 
 
+@arguments.called_as("FileRecording({'angle [deg]': angle, 'torque [N m]': torque})")
 class FileRecording(Mapping[str, Channel]):
     """A recording from a file: a mapping of names to channels, each an array with its unit.
 
@@ -338,6 +339,7 @@ def _check_no_counts(time: npt.NDArray[np.float64], unit_said: str) -> None:
         )
 
 
+@arguments.called_as("read_recording('run.csv')")
 def read_recording(path: str | Path, *, missing: float | Sequence[float] = ()) -> FileRecording:
     """Read a recording from a file: its channels by name, with their units and the sample rate.
 

@@ -48,6 +48,7 @@ Every piece in weak form judges for itself at which lengths windows are averaged
 
 
 # All but the files are options, as users call it.
+@arguments.called_as("identify_file('in.npy', 'out.parquet', angle='angle', torque='torque', sample_rate=1000)")
 def identify_file(
     path: str | Path,
     output: str | Path,

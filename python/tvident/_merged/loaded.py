@@ -24,6 +24,7 @@ from tvident._status import Status
 Array: TypeAlias = npt.NDArray[np.float64]
 
 
+@arguments.called_as("load('result.csv')")
 def load(path: str | Path) -> Any:
     r"""Return a result that ``save`` wrote, as it was to the last bit.
 

@@ -23,6 +23,7 @@ _STEP = 1e-3
 """Part of a coordinate's spread by which it is moved to find slopes; those of fourth order are then wrong by a part of 1e-13 or so."""
 
 
+@arguments.called_as("Mechanism(kinetic={'mass': lambda q, q_dot: 0.5 * q_dot[0] ** 2})")
 @dataclass(frozen=True, eq=False)
 class Mechanism:
     r"""Bodies whose equations of motion follow from their energies: an arm, a double pendulum, a crank, a robot.

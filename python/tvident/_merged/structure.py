@@ -24,6 +24,7 @@ JOINT_TERMS = tuple(name for name, one in BUILT_IN.items() if name != OFFSET and
 """What may act between two masses."""
 
 
+@arguments.called_as("Chain(masses=2, springs=[('base', 0), (0, 1)])")
 @dataclass(frozen=True, eq=False)
 class Chain:
     r"""Masses that springs and dampers connect to each other and to a base: what an engineer draws, rather than matrices.

@@ -97,6 +97,7 @@ class RollingRegression:
 
 
 # All but the data are options, as users call it.
+@arguments.called_as("rolling_least_squares(A, b, 200)")
 def rolling_least_squares(
     A: npt.ArrayLike,
     b: npt.ArrayLike,

@@ -44,6 +44,7 @@ class StreamedDerivatives:
         return f"<StreamedDerivatives at {span_of(self.time, 'samples', 'time')}>"
 
 
+@arguments.called_as("LocalPolynomialStream(201, sample_rate=1000)")
 class LocalPolynomialStream(SampleStream[StreamedDerivatives]):
     """Differentiate samples as they come: :func:`fit_local_polynomials`, piece by piece.
 

@@ -49,6 +49,7 @@ class StreamedRegression:
         return f"<StreamedRegression at {span_of(self.row, 'rows', 'row')}>"
 
 
+@arguments.called_as("RollingStream(200)")
 class RollingStream(Stream[StreamedRegression]):
     """Solve least squares in windows of rows as they come: :func:`rolling_least_squares`, piece by piece.
 
