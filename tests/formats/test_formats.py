@@ -372,3 +372,32 @@ def test_a_dataset_of_hdf5_without_samples_is_said(tmp_path: Path) -> None:
     assert list(found) == ["angle", "torque"]
     assert told[0].startswith("the sample rate of the file is no number: Empty")
     assert told[1:] == ["note (no samples)", "nothing (no samples)"]
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("sample_rate", "250 Hz"),
+        ("fs", "0.25 kHz"),
+        ("SampleRate", "250"),
+        ("Sampling Frequency", np.bytes_(b"250 S/s")),
+        ("sample rate (Hz)", 250),
+    ],
+)
+@pytest.mark.parametrize("where", ["/", "angle", "rig"])
+def test_a_rate_of_hdf5_may_be_a_text_and_stand_anywhere(tmp_path: Path, name: str, said: Any, where: str) -> None:
+    """A text with a unit was said to be no number, and what stood beside a channel or its group was not looked at."""
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        file["angle"], file["rig/torque"] = examples.ANGLE, examples.TORQUE
+        file[where].attrs[name] = said
+    assert tvident.read_recording(tmp_path / "x.h5").sample_rate == 250
+
+
+def test_rates_of_hdf5_that_differ_are_said(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        for channel, rate in (("angle", "250 Hz"), ("torque", 500.0)):
+            file[channel] = examples.ANGLE
+            file[channel].attrs["fs"] = rate
+    with pytest.warns(recordings.FileWarning, match="channels have several sample rates in Hz: 250, 500; none is read"):
+        found = tvident.read_recording(tmp_path / "x.h5")
+    assert list(found) == ["angle", "torque"]

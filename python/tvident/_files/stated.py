@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from tvident._files.names import printable
 from tvident._files.recordings import TEXT_ENDINGS
 from tvident._files.text import read_start
 from tvident._files.unpacked import ending_of
-from tvident._units import UnitError, factor_between
+from tvident._units import rate_of
 
 _SEARCHED = 100
 """Lines that are looked at."""
@@ -37,8 +36,6 @@ _BEFORE_UNIT = r"(?<=\d)(?!e[+-]?\d)(?=[^\W\d_])"
 """Where a unit follows its number without a blank, as in 500Hz."""
 
 _BEHIND_NAME = re.compile(r'(?:[\[(][^\])]*[\])])?"?\s*,')
-_A_SECOND = re.compile(r"(k?)(?:sa?|samples?|scans?)(?:/s|/sec|ps)", re.IGNORECASE)
-"""Units that count samples in a second, as kS/s."""
 
 
 @dataclass(frozen=True)
@@ -99,20 +96,5 @@ def _rate_in(line: str) -> float | None:
             return None
         if said.groupdict().get("short") and not units:
             return None
-        return _per_second(value, next(iter(units), ""), is_rate=is_rate)
+        return rate_of(value, next(iter(units), ""), is_rate=is_rate)
     return None
-
-
-def _per_second(value: float, unit: str, *, is_rate: bool) -> float | None:
-    """Return a rate, or one over a period, in samples per second; None where the unit is another, or a period has none."""
-    counted = _A_SECOND.fullmatch(unit)
-    if is_rate and counted is not None:
-        return value * (1e3 if counted[1] else 1.0)
-    if not is_rate and not unit:
-        return None
-    try:
-        scaled = value * factor_between(unit, "Hz" if is_rate else "s", name="the rate")
-    except UnitError:
-        return None
-    rate = scaled if is_rate else 1 / scaled
-    return rate if math.isfinite(rate) else None

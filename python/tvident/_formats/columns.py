@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from tvident._formats.told import Remark, cut
+from tvident._units import rate_said
 
 UNITS = ("unit", "units", "Unit", "Units", "UNITS")
 """Attributes that hold a unit, or one for every column."""
@@ -16,8 +17,13 @@ COLUMNS = re.compile(
 )
 """What a list of the columns of a matrix beside it is called, as ``importdata`` has it in ``colheaders``."""
 
-_RATES = ("sample_rate", "sampling_rate", "fs", "Fs", "samplerate", "SampleRate")
-"""Attributes that hold a sample rate."""
+_RATES = re.compile(
+    r"[fF]s|(?i:(sampl(e|ing)|acquisition|scan)[ _-]?(rate|freq(uency)?)([ _-]?[([]?(in[ _-]?)?hz[)\]]?)?)"
+)
+"""What attributes are called that hold a sample rate."""
+
+_SHOWN = 5
+"""Rates that are listed at most."""
 
 _WORD = re.compile(r"name|label|header|title")
 """What is about the whole where it is a text: a list of these has the name of each column."""
@@ -57,14 +63,36 @@ def first_of(attributes: Mapping[str, Any], names: Sequence[str]) -> Any:
     return None
 
 
-def rate_in(attributes: Mapping[str, Any], skipped: list[str]) -> float | None:
-    """Return the samples per second that attributes hold; None where there are none, or they are no number, which is said."""
-    rate = first_of(attributes, _RATES)
-    try:
-        return None if rate is None else float(rate)
-    except (TypeError, ValueError):
-        skipped.append(Remark(f"the sample rate of the file is no number: {cut(str(rate))}; it is not read"))
+def rate_in(whole: Mapping[str, Any], parts: Sequence[Mapping[str, Any]], skipped: list[str]) -> float | None:
+    """Return the samples per second that the attributes of a file hold, or else all of its parts that hold one.
+
+    None where there are none, where they differ, or where one is no number; both is said.
+    """
+    said = [one for one in map(_rate, [whole]) if one is not None] or [
+        one for one in map(_rate, parts) if one is not None
+    ]
+    rates = dict.fromkeys(one if isinstance(one, float) else None for one in said)
+    if None in rates:
+        words = next(one for one in said if not isinstance(one, float))
+        skipped.append(Remark(f"the sample rate of the file is no number: {cut(str(words))}; it is not read"))
         return None
+    if len(rates) > 1:
+        shown = ", ".join(f"{one:g}" for one in list(rates)[:_SHOWN])
+        skipped.append(
+            Remark(f"channels have several sample rates in Hz: {shown}; none is read: give that of those you use")
+        )
+        return None
+    return next(iter(rates), None)
+
+
+def _rate(attributes: Mapping[str, Any]) -> Any:
+    """Return the samples per second that attributes hold, or what they say where that is no number; None where they say nothing."""
+    said = first_of(attributes, [name for name in attributes if _RATES.fullmatch(str(name))])
+    try:
+        rate = rate_said(said) if isinstance(said, str) else None if said is None else float(said)
+    except (TypeError, ValueError):
+        return said
+    return said if rate is None else rate
 
 
 def _named(name: str, unit: Any) -> str:

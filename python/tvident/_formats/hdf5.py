@@ -18,7 +18,10 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
 
     with h5py.File(path, "r") as file:
         found = dict(_datasets(file, "", h5py))
-        rate = rate_in(file.attrs, skipped)
+        parts = {
+            one.name: one.attrs for dataset in found.values() for one in (dataset, dataset.parent) if one.name != "/"
+        }
+        rate = rate_in(file.attrs, list(parts.values()), skipped)
         if rate is not None:
             yield "sample_rate [Hz]", np.float64(rate)
         lists = dict(_lists(found))

@@ -17,7 +17,7 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     opened: Any = zarr.open(path, mode="r")
     alone = isinstance(opened, zarr.Array)
     found = {"": (opened, [dict(opened.attrs)])} if alone else dict(_arrays(opened, "", []))
-    rate = rate_in(dict(opened.attrs), skipped)
+    rate = rate_in(dict(opened.attrs), [one for _, each in found.values() for one in each], skipped)
     if rate is not None:
         yield "sample_rate [Hz]", np.float64(rate)
     for name, (array, attributes) in found.items():

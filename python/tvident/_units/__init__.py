@@ -22,6 +22,7 @@ from tvident._units.quantities import (
     is_convertible,
     system_of,
 )
+from tvident._units.rates import rate_of, rate_said
 from tvident._units.words import QUOTED, in_words_of
 
 __all__ = [
@@ -46,6 +47,8 @@ __all__ = [
     "is_unit",
     "may_count_samples",
     "named_unit",
+    "rate_of",
+    "rate_said",
     "scaled",
     "system_of",
     "times_in_seconds",
