@@ -43,6 +43,18 @@ RIGOL = """X,CH1,CH2,Start,Increment,
 Sequence,Volt,Volt,-1.0e-01,1.0e-03
 """
 
+SIGLENT = """Record Length,Analog:200
+Sample Interval,Analog:1.000000E-03
+Vertical Units,{units}
+Vertical Scale,0.5
+Vertical Offset,0.0
+Horizontal Units,s
+Horizontal Scale,0.01
+Model Number,SDS1104X-E
+Source,{names}
+Second,{words}
+"""
+
 BESIDE = [
     ("Record Length", "200"),
     ("Sample Interval", "1e-3"),
@@ -116,4 +128,25 @@ def test_keys_beside_the_samples_are_no_samples(tmp_path: Path, channels: int) -
     assert found.units == {"time": "s", "CH1": "V"} | ({"CH2": "V"} if channels > 1 else {})
     np.testing.assert_array_equal(found["time"], TIME)
     np.testing.assert_array_equal(found[f"CH{channels}"], (FIRST, SECOND)[channels - 1])
+    assert found.sample_rate == 1000
+
+
+@pytest.mark.parametrize("channels", [1, 2])
+def test_sources_of_siglent_are_names(tmp_path: Path, channels: int) -> None:
+    """Times were called Source, and units in two lines were said not to be read."""
+    names, units, words = ("CH1", "CH2")[:channels], ("V", "A")[:channels], ("Volt", "Ampere")[:channels]
+    header = SIGLENT.format(names=",".join(names), units=",".join(units), words=",".join(words))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = read(tmp_path, header + rows(TIME, *(FIRST, SECOND)[:channels]))
+    assert found.units == {"time": "s", **dict(zip(names, units, strict=True))}
+    assert found.sample_rate == 1000
+    np.testing.assert_array_equal(found["CH1"], FIRST)
+
+
+@pytest.mark.parametrize("header", ["in s,C1 in V,C2 in A", '"in s","C1 in V","C2 in A"'])
+def test_rohde_and_schwarz_call_times_by_their_unit_alone(tmp_path: Path, header: str) -> None:
+    """No channel of times was found."""
+    found = read(tmp_path, f"{header}\n{rows(TIME, FIRST, SECOND)}")
+    assert found.units == {"time": "s", "C1": "V", "C2": "A"}
     assert found.sample_rate == 1000

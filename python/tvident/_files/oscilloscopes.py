@@ -11,11 +11,11 @@ from typing import TextIO
 from tvident._files.cells import number, split
 from tvident._files.channels import Channels, FileError, Say
 from tvident._files.names import printable
-from tvident._units import is_unit, named_unit, with_unit
+from tvident._units import is_unit, named_unit, unit_of, with_unit
 
-_LABELS, _TRACES = ("label", "labels"), ("tracename",)
+_LABELS, _TRACES, _SOURCES = ("label", "labels"), ("tracename",), ("source",)
 _UNITS, _UNIT_OF_TIMES = ("vertical units", "vunit"), ("horizontal units", "hunit")
-"""Keys of lines that say something of every channel (Tektronix, Yokogawa)."""
+"""Keys of lines that say something of every channel (Tektronix, Yokogawa, Siglent)."""
 
 _COUNTED = re.compile(
     r"X,(?P<names>[^\n]*?),? {0,3}Start, {0,3}Increment[, ]*\r?\nSequence,(?P<rest>[^\n]*)\n", re.IGNORECASE
@@ -47,6 +47,9 @@ def names_of_keys(lines: Sequence[Sequence[str]], most: int) -> list[str]:
     if units is None or not of_times:
         return []
     names = ["", *traces] if traces is not None else list(lines[-1])
+    sources = said(_SOURCES)
+    if sources is not None and unit_of(names[0]) is not None:
+        names = ["time", *sources]  # behind which Siglent writes units once more, in words
     labels = said(_LABELS) or []
     if len(names) != most or (traces is None and names[0].casefold() != "time"):
         return []

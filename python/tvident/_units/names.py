@@ -13,7 +13,9 @@ _IN_BRACKETS = re.compile(
 _WITHIN = re.compile(r"(.*?)[\s_]*(?:\[([^\[\]]*)\]|(?<=[\s_])\(([^()]*)\)|\(([^()]{2,})\))[\s_]*(.*)", re.DOTALL)
 """A unit before or amid words. Without a blank before it, what stands in parentheses may be the argument of a function."""
 _WIDE = str.maketrans("（）［］【】｛｝", "()[][]{}")  # noqa: RUF001 - as Japanese and Chinese programs write them
-_BEHIND_A_SIGN = re.compile(r"(.+?)\s*(?:(?<![/\s])\s*/\s*|,\s*|\s+in\s+)([^,]+)", re.DOTALL)
+_BEHIND_A_SIGN = re.compile(r"(.+?)\s*(?:(?<![/\s])\s*/\s*|,\s*|\s+(?:in|en)\s+)([^,]+)", re.DOTALL)
+_OF_NO_NAME = re.compile(r"in\s+([mnuµ]?s)")
+"""How Rohde & Schwarz call times."""
 _PATHS = ("s", "h")
 """Symbols of a path and of a height, which would be units elsewhere."""
 _LONG = (
@@ -77,8 +79,9 @@ def named_unit(name: str) -> tuple[str, str]:
 
 
 def _without_brackets(name: str) -> tuple[str, str]:
-    if _ALONE.fullmatch(name):
-        return name, _TIMES.get(name.lower(), name)
+    nameless = _OF_NO_NAME.fullmatch(name)
+    if nameless or _ALONE.fullmatch(name):
+        return ("time", nameless[1]) if nameless else (name, _TIMES.get(name.lower(), name))
     found = _BEHIND_A_SIGN.fullmatch(name)
     if found and _is_unit_of(found[2], found[1]):
         return found[1], found[2].strip()
