@@ -212,6 +212,10 @@ def test_a_sample_rate_that_lines_above_the_numbers_state_is_used(
     assert f"it may be --sample-rate {rate:g}, as the file says: '" in asked.stderr
     listed = CliRunner().invoke(main, ["info", "x.csv"])
     assert f"no channel holds times; it may be --sample-rate {rate:g}" in listed.stdout
+    piped = CliRunner().invoke(
+        main, ["identify", "-", "--angle", "angle", "--torque", "torque"], Path("x.csv").read_bytes()
+    )
+    assert f"it may be --sample-rate {rate:g}, as the file says: '" in piped.stderr
 
 
 def test_a_sample_rate_below_the_numbers_is_not_stated_above_them(tmp_path: Path) -> None:
@@ -288,8 +292,11 @@ def test_a_rate_that_is_stated_beside_times_of_another_is_said(
         recording = tvident.read_recording(place)
     assert any(f"it states {shown}, which is used: check which is right" in str(one.message) for one in said)
     assert recording["time"].unit == times
-    told = CliRunner().invoke(main, ["info", str(place)])
-    assert f"it states {shown}" in told.stderr
+    for told in (
+        CliRunner().invoke(main, ["info", str(place)]),
+        CliRunner().invoke(main, ["info", "-"], place.read_bytes()),
+    ):
+        assert f"it states {shown}" in told.stderr
     place.write_text(place.read_text().replace("\t2\tSampleTime[ms]\t2", "\t1\tSampleTime[ms]\t1").replace("1000", "1"))
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")

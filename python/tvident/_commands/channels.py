@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from tvident import recordings
 from tvident._files import (
+    StatedRate,
     ending_by,
     full_name,
     increasing_times,
@@ -32,6 +33,9 @@ _RATES = {"fs", "fsamp", "samplerate", "samplingrate", "samplefrequency", "sampl
 """What a sample rate is called beside channels, without blanks and lines."""
 
 _MOST_START = 4096
+
+_STATED = "tvident.stated"
+"""Where a command keeps the sample rate that lines of standard input state, which is read once."""
 
 
 def channel_of(channels: recordings.Channels, name: str, file: str | None) -> npt.NDArray[Any]:
@@ -95,8 +99,13 @@ def _rate_in(channels: recordings.Channels) -> str:
 
 def stated_in(file: str | None) -> str:
     """Return what to type where a line above the numbers of a text states the sample rate; nothing elsewhere."""
-    stated = None if file in {None, "-"} else stated_rate(Path(str(file)))
+    stated = None if file is None else _stated_of_input() if file == "-" else stated_rate(Path(file))
     return "" if stated is None else f"; it may be --sample-rate {stated.rate:.10g}, as the file says: '{stated.words}'"
+
+
+def _stated_of_input() -> StatedRate | None:
+    context = click.get_current_context(silent=True)
+    return None if context is None else context.meta.get(_STATED)
 
 
 def channels_in(file: str | None) -> recordings.Channels:
@@ -138,6 +147,11 @@ def _standard_input() -> recordings.Channels:
             found = recordings.read(named, missing=marks_missing())
         except recordings.FileError as error:
             raise recordings.FileError(str(error).replace(str(named), "standard input")) from None
+        otherwise, context = said_otherwise(named, found), click.get_current_context(silent=True)
+        if context is not None:
+            context.meta[_STATED] = stated_rate(named)
+    if otherwise:
+        click.echo(f"Warning: standard input: {otherwise}", err=True)
     for one in said:
         click.echo(f"Warning: {str(one.message).replace(str(named), 'standard input')}", err=True)
     return found

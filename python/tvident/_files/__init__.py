@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from tvident._files.rates import other_rate
     from tvident._files.recorded import FileRecording, increasing_times, read_recording, said_otherwise, time_channels
     from tvident._files.recordings import TEXT_ENDINGS, read
-    from tvident._files.stated import stated_rate
+    from tvident._files.stated import StatedRate, stated_rate
     from tvident._files.text import copy_text
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "FileError",
     "FileRecording",
     "FileWarning",
+    "StatedRate",
     "aligned",
     "channel",
     "check_apart",
@@ -75,6 +76,7 @@ _READERS = {
     "time_channels": "recorded",
     "read": "recordings",
     "TEXT_ENDINGS": "recordings",
+    "StatedRate": "stated",
     "stated_rate": "stated",
     "copy_text": "text",
 }
