@@ -156,3 +156,29 @@ def test_a_log_of_columns_is_text(tmp_path: Path, between: str) -> None:
     assert recording.units == {"time": "", "angle": "deg", "torque": ""}
     np.testing.assert_array_equal(recording["torque"], TORQUE)
     assert recording.sample_rate == 500
+
+
+@pytest.mark.parametrize("name", ["run.jsonl", "run.json"])
+def test_samples_that_are_all_alike_are_read_as_others(tmp_path: Path, name: str) -> None:
+    """They are read at once, those that differ one by one."""
+    rows: list[dict[str, Any]] = [
+        {"time": t, "angle": a, "count": n, "on": n % 2 == 0, "none": float("nan")}
+        for n, (t, a) in enumerate(zip(TIME.tolist(), ANGLE.tolist(), strict=True))
+    ]
+
+    def text(rows: list[dict[str, Any]]) -> str:
+        return json.dumps(rows) if name == "run.json" else "".join(f"{json.dumps(row)}\n" for row in rows)
+
+    alike = read(tmp_path, text(rows), name)
+    rows[3] = dict(reversed(rows[3].items()))
+    turned = read(tmp_path, text(rows), name)
+    rows[3] = {"time": str(rows[3]["time"]), **{key: one for key, one in rows[3].items() if key != "time"}}
+    one_by_one = read(tmp_path, text(rows), name)
+    assert list(alike) == list(turned) == ["time", "angle", "count", "on", "none"]
+    for channel, values in alike.items():
+        np.testing.assert_array_equal(values, turned[channel])
+        np.testing.assert_array_equal(values, one_by_one[channel])
+    np.testing.assert_array_equal(alike["angle"], ANGLE)
+    np.testing.assert_array_equal(alike["on"], (np.arange(COUNT) + 1) % 2)
+    with pytest.raises(recordings.FileError, match=r"must hold|is not a number|has too many digits|has .1000"):
+        read(tmp_path, text([{"time": 10**400}, {"time": 1}]), name)

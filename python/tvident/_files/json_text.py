@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,8 @@ _LINES = 'one object in every line, as {"time": 0.001, "angle": 0.1, "torque": 2
 
 _DEEPEST = 20
 """Objects in objects."""
+
+_NUMBERS = {int, float, bool}
 
 _UNITS = ("unit", "units")
 """Members that hold the units of those beside them."""
@@ -57,21 +60,30 @@ def read_json(path: Path, say: Say) -> Channels:
     raise FileError(f"JSON must hold samples; this one holds {printable(str(whole), 40)} alone; write {_LINES}")
 
 
+class _TwiceError(Exception):
+    """A name that two members of an object have."""
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        raise _TwiceError(next(name for name in names if names.count(name) > 1))
+    return found
+
+
+_DECODER = json.JSONDecoder(object_pairs_hook=_unique)
+"""Made once: a decoder of its own for every line takes as long as the line."""
+
+
 def _parsed(text: str, place: int) -> Any:
     """Return what a text of JSON holds; no member may have the name of another beside it."""
-
-    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        found = dict(pairs)
-        if len(found) < len(pairs):
-            names = [name for name, _ in pairs]
-            again = next(name for name in names if names.count(name) > 1)
-            raise FileError(
-                f"names of an object must differ; from line {place} on one has '{printable(again, 40)}' twice; rename one"
-            )
-        return found
-
     try:
-        return json.loads(text, object_pairs_hook=unique)
+        return _DECODER.decode(text)
+    except _TwiceError as error:
+        raise FileError(
+            f"names of an object must differ; from line {place} on one has '{printable(str(error), 40)}' twice; rename one"
+        ) from None
     except ValueError as error:
         if isinstance(error, json.JSONDecodeError):
             raise
@@ -103,6 +115,9 @@ def _of_lines(lines: Sequence[str], say: Say) -> list[tuple[int, Any]]:
 
 def samples_of(rows: Sequence[tuple[int, Any]], say: Say) -> Channels:
     """Return the channels of samples, each an object with its place: NaN where one lacks a member that others have."""
+    even = _of_even_samples([one for _, one in rows])
+    if even is not None:
+        return even
     columns: dict[str, dict[int, Any]] = {}
     for row, (place, one) in enumerate(rows):
         if not isinstance(one, Mapping | list):
@@ -122,6 +137,29 @@ def samples_of(rows: Sequence[tuple[int, Any]], say: Say) -> Channels:
     return channels
 
 
+def _of_even_samples(rows: Sequence[Any]) -> Channels | None:
+    """Return the channels of samples that all have the same members, numbers alone; None where they are anything else.
+
+    Most are such, and are read in a fifth of the time.
+    """
+    if not rows or type(rows[0]) is not dict or not rows[0]:
+        return None
+    names = list(rows[0])
+    check_count(len(names))
+    if any(type(one) is not dict or one.keys() != rows[0].keys() for one in rows):
+        return None
+    channels: Channels = {}
+    for name in names:
+        cells = [one[name] for one in rows]
+        if not set(map(type, cells)) <= _NUMBERS:
+            return None
+        try:
+            channels[name] = np.array(cells, np.float64)
+        except OverflowError:
+            return None
+    return channels
+
+
 def _members(prefix: str, value: Any, depth: int) -> Iterable[tuple[str, Any]]:
     """Give what is no object and no list, with the names of what it is in before its own."""
     if depth > _DEEPEST:
@@ -136,6 +174,9 @@ def _members(prefix: str, value: Any, depth: int) -> Iterable[tuple[str, Any]]:
 
 def _column(name: str, cells: Mapping[int, Any], places: Sequence[int], say: Say) -> tuple[str, Numbers] | None:
     """Return the name and the samples of a column; None where it holds words, which is said."""
+    if len(cells) == len(places) and set(map(type, cells.values())) <= _NUMBERS:
+        with suppress(OverflowError):  # said below
+            return name, np.array([cells[row] for row in range(len(places))], np.float64)
     found = np.full(len(places), np.nan)
     words = {row: cell.strip() for row, cell in cells.items() if isinstance(cell, str)}
     values = {row: number(cell, comma=False) for row, cell in words.items()}
