@@ -265,3 +265,12 @@ def test_a_wrong_call_says_what_would_be_right(change: dict[str, Any], error: ty
     options: dict[str, Any] = {"angle": da.ones(9000), "torque": da.ones(9000), "sample_rate": 1000, "method": "paper"}
     with pytest.raises(error, match=words):
         tvident.dask.identify(**(options | change))
+
+
+def test_a_result_that_is_not_computed_yet_is_shown_in_one_line(rig: tvident.Recording) -> None:
+    """It was what dask says of its arrays, and all units, over many lines."""
+    angle, torque = (chunked([one[:8000]] * 3, (1, 4000)) for one in (rig.angle, rig.torque))
+    found = tvident.dask.identify(angle, torque, sample_rate=1000, method="paper")
+    assert repr(found) == "<DaskIdentification of 3 records of 8000 samples, in dask arrays that are not computed yet>"
+    found = tvident.dask.identify(angle[0], torque[0], sample_rate=1000, method="paper")
+    assert "of 1 record of 8000 samples" in repr(found)

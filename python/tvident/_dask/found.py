@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -58,6 +59,12 @@ class DaskIdentification:
     chosen: Any = field(repr=False)
     units: Mapping[str, str]
     told: Any = field(repr=False)
+
+    def __repr__(self) -> str:
+        *batch, samples = self.inertia.shape
+        count = math.prod(batch)
+        records = f"{count} record{'' if count == 1 else 's'}"
+        return f"<DaskIdentification of {records} of {samples} samples, in dask arrays that are not computed yet>"
 
     @cached_property
     def settings(self) -> dict[str, Any]:

@@ -71,8 +71,8 @@ def identify(
     With everything windowed in strong form, as with ``method="paper"``, the numbers are those of one call in memory, bit for bit, beside
     missing samples too, as long as none has a weight and there is no lag. With everything constant in strong form, the triangular factors
     of the equations of all blocks are merged in a tree, and the constants are those of one call to 1e-12 of themselves, times the condition
-    of the equations. In weak form, and with weights or a lag, blocks are records of their own, whose constants are put together, as in
-    :func:`tvident.identify_file`.
+    of the equations. In weak form, where some parameters are windowed and others constant, and with weights or a lag, blocks are records
+    of their own, whose constants are put together, as in :func:`tvident.identify_file`.
 
     Every block is one task on one thread: dask has as many threads as there is to do. A task has no state, so where a worker is lost its
     blocks are computed again elsewhere.
