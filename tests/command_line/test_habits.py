@@ -159,7 +159,23 @@ def test_a_run_is_repeated_from_its_result_and_from_toml(folder: Path) -> None:
     (folder / "run.toml").write_text("stifness = 0\n")
     wrong = run(*IDENTIFY, "--settings", "run.toml")
     assert wrong.returncode == 2
-    assert "must hold options of tvident identify, without dashes before them; got 'stifness'; use" in wrong.stderr
+    assert (
+        "must hold options of tvident identify, without dashes before them; got 'stifness'; did you mean 'stiffness'?"
+        in wrong.stderr
+    )
+
+
+def test_one_file_has_options_of_several_commands(folder: Path) -> None:
+    """A table of a command was "no option"."""
+    (folder / "rig.toml").write_text(
+        'sample-rate = 1000\n[identify]\nangle = "angle"\ntorque = "torque"\nmethod = "paper"\n[derivatives]\nchannel = "angle"\n'
+        "order = 3\nwindow-length = 41\n"
+    )
+    assert run("identify", "rig.npz", "--settings", "rig.toml", "-o", "found.npz").returncode == 0
+    assert tvident.load("found.npz").settings["method"] == "paper"
+    done = run("derivatives", "rig.npz", "--settings", "rig.toml", "-o", "slopes.npz")
+    assert done.returncode == 0, done.stderr
+    assert "windows of 41" in done.stdout
 
 
 def test_settings_are_read_from_a_file_of_any_name(folder: Path) -> None:

@@ -13,6 +13,7 @@ import click
 
 import tvident
 from tvident import recordings
+from tvident._arguments import nearest
 from tvident._files import TABLE_ENDINGS, keeps_result, printable, settings_beside
 
 _MOST_BYTES = 100_000_000
@@ -74,16 +75,29 @@ def options_from_toml(ctx: click.Context, path: str) -> str | None:
     content = read_settings(path)
     if {"form", "kinds"} <= content.keys():
         return path
+    content = _of_command(ctx, content)
     known = {name.lstrip("-"): one for one in ctx.command.params for name in (*one.opts, *one.secondary_opts)}
     foreign = [name for name in content if name.replace("_", "-") not in known or name == "settings"]
     if foreign:
+        names = sorted(name for name in known if len(name) > 1)
+        near = nearest(foreign[0].replace("_", "-"), names)
         raise click.UsageError(
             f"{printable(path)} must hold options of tvident {ctx.command.name}, without dashes before them; got {foreign[0]!r}; "
-            f"use {', '.join(sorted(name for name in known if len(name) > 1))}"
+            f"{f'{near} Others are' if near else 'use'} {', '.join(names)}"
         )
     values = {known[name.replace("_", "-")]: value for name, value in content.items()}
     ctx.default_map = {one.name or "": _as_typed(one, value) for one, value in values.items()}
     return None
+
+
+def _of_command(ctx: click.Context, content: dict[str, Any]) -> dict[str, Any]:
+    """Return what a file holds for a command, whose table may bear its name, as [identify]; tables of others are theirs."""
+    above = ctx.parent
+    group = above.command if above is not None else None
+    commands = group.list_commands(above) if isinstance(group, click.Group) and above is not None else []
+    own = content.get(ctx.command.name or "")
+    rest = {name: one for name, one in content.items() if not (name in commands and isinstance(one, dict))}
+    return {**rest, **own} if isinstance(own, dict) else rest
 
 
 def _as_typed(option: click.Parameter, value: Any) -> Any:
