@@ -85,3 +85,17 @@ def test_what_is_not_spoilt_is_trusted(pattern: Any, noise: float, kinds: Any) -
     found = identified(noisy, rig.torque, **(kinds if pattern == "constant" else {}))
     assert not any("the weak form finds other" in line for line in found.advice)
     assert "do not trust" not in found.summary().splitlines()[0]
+
+
+def test_a_spoilt_record_of_a_batch_is_named() -> None:
+    """Of several records nobody looked: "no reason to distrust any", and one said what was seen in another."""
+    rig = tvident.simulate_torsional_rig(10.0, pattern="constant")
+    spoilt = rig.angle.copy()
+    spoilt[[2000, 5000, 8000]] += 1.0
+    both = identified(np.stack([rig.angle, spoilt]), np.stack([rig.torque] * 2))
+    first = both.summary().splitlines()[0]
+    assert "do not trust 1 of them, such as record 1: the weak form finds another" in first
+    assert both[0].summary().startswith("K(t) known to")
+    assert not any("spikes" in line for line in both[0].advice)
+    assert both[1].summary().startswith(NAMED)
+    assert any(line.startswith("3 samples of the angle stand far out") for line in both[1].advice)

@@ -11,14 +11,16 @@ import numpy.typing as npt
 from tvident import _core
 from tvident._advice.channels import held
 from tvident._arguments import listed, ordinal
+from tvident._results import STAYS
 from tvident._status import Status, stretches_of, untold_samples
 
 _SHOWN = 6
 """Pulses that are listed at most."""
 
+_NAN = f"make them NaN, {STAYS}takes them out"
 _APART = (
     "windows over such a place are wrong in strong form: exclude half a window on either side with mask=, give the parts as a list of "
-    "records, or use method='auto', which leaves such equations out"
+    f"records, {STAYS}leaves such equations out"
 )
 """What to do about places at which the angle jumps."""
 
@@ -82,10 +84,9 @@ def without_numbers(
 
 def events_that_stay(angles: npt.NDArray[np.number], torques: npt.NDArray[np.number]) -> list[tuple[int, str]]:
     """Return what to do about readings that failed, spikes and jumps, by record, where nothing took them out."""
-    make_nan = "make them NaN, or use method='auto', which takes them out"
     looked_for = (
-        (_not_read, make_nan, _core.unread_counts),
-        (_out_of_neighbours, make_nan, _core.spike_counts),
+        (_not_read, _NAN, _core.unread_counts),
+        (_out_of_neighbours, _NAN, _core.spike_counts),
         (_between_samples, _APART, _core.break_counts),
     )
     return [

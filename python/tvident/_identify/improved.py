@@ -101,14 +101,27 @@ def is_doubted(flags: int) -> bool:
 
 
 def of_one(
-    data: Data, request: Request, flags: int, run: Callable[..., Identification]
+    data: Data,
+    request: Request,
+    flags: Any,
+    run: Callable[..., Identification],
+    in_weak_form: Callable[[Sequence[Any]], Callable[[Any, Words], Words] | None],
 ) -> Callable[[Any, Words], Words] | None:
     """Return what tries the remedies of one record of several, as if it had been identified alone; None where nothing is to be tried.
 
-    Settings of an earlier result are those of the batch, so nothing is tried with them.
+    Settings of an earlier result are those of the batch, so nothing is tried with them. Of strong form the weak form tells more.
     """
+    if data.batch:
+        return None
+    if is_told_by_weak_form(data, request):
+        return in_weak_form(())
     is_repeated = bool(request.by_record) or request.lag_samples is not None
-    if not isinstance(request.form, WeakForm) or data.instruments is not None or is_repeated or not is_doubted(flags):
+    if (
+        not isinstance(request.form, WeakForm)
+        or data.instruments is not None
+        or is_repeated
+        or not is_doubted(int(flags))
+    ):
         return None
 
     def improve(_: Any, words: Words) -> Words:

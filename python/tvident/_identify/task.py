@@ -253,13 +253,12 @@ class Task:
             some_data = data.of(place)
             some_used = replace(some_data, angles=used.angles[place], torques=used.torques[place])
             kinds = {name: np.asarray(kind)[place] for name, kind in found.kinds.items()}
-            alone = some_data.angles.ndim == 1
-            own = settings_of(settings, chosen(place, data.batch), kinds, alone=alone)
+            own = settings_of(settings, chosen(place, data.batch), kinds, alone=some_data.angles.ndim == 1)
             known = {name: value if isinstance(value, float) else value[place] for name, value in self._known.items()}
             request = replace(self._request, parameters={**self._request.parameters, **known})
-            one, run = of_records(found, place), Task(some_data, request).run
+            one, task = of_records(found, place), Task(some_data, request)
             recorded = Task(some_data, replace(request, by_record={}, lag=0.0))._recorded(own, one, some_used)  # noqa: SLF001 - of this class
-            return replace(recorded, improve=of_one(some_data, request, int(one.record_status), run) if alone else None)
+            return replace(recorded, improve=of_one(some_data, request, one.record_status, task.run, task._improve))
 
         inner = {name: np.ravel(value) for name, value in settings["inner"].items()}
         is_strong = isinstance(self._request.form, StrongForm)

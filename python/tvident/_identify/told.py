@@ -81,6 +81,8 @@ class Told:
             words = self._of_strong_form(settings).words()
             words = replace(words + (of_batch(more) if several else more[0]), each=words.each)
             words = plausible.before(words, data.angles, self.batch)
+            if several and not words.each:
+                words = replace(words, each=tuple(Words(words.reasons, words.advice) for _ in self.found))
             doubts = [*holds_that_stay(data.angles), *events_that_stay(data.angles, data.torques)]
             if not data.motion.recorded:
                 # What was made of several channels, or integrated, has no noise above the motion that would be the angle's alone.

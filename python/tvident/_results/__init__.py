@@ -35,7 +35,7 @@ from tvident._results.verdict import (
     why_not,
 )
 from tvident._results.windows_beside import WindowsBeside
-from tvident._results.words import BECOMES, FED_BACK, MARKED, OF_WEAK_FORM, TRIED, UNTOLD_LAG, Words, of_batch
+from tvident._results.words import BECOMES, FED_BACK, MARKED, OF_WEAK_FORM, STAYS, TRIED, UNTOLD_LAG, Words, of_batch
 
 __all__ = [
     "BECOMES",
@@ -46,6 +46,7 @@ __all__ = [
     "MARKED",
     "OF_WEAK_FORM",
     "POOR",
+    "STAYS",
     "TRIED",
     "UNTOLD_LAG",
     "Estimates",

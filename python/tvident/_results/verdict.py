@@ -13,7 +13,7 @@ import numpy as np
 from tvident import _core
 from tvident._arguments import explained_in_words, percent, percentiles, to_digits_of, told_once
 from tvident._results.torque import noise_of_compared
-from tvident._results.words import BECOMES, CONDITIONS, MARKED, OF_WEAK_FORM, OTHER_UNIT, TRIED
+from tvident._results.words import BECOMES, CONDITIONS, MARKED, OF_WEAK_FORM, OTHER_UNIT, STAYS, TRIED
 from tvident._status import Status
 from tvident._units import in_words_of
 
@@ -195,8 +195,11 @@ def share_of(recorded: Any, predicted: Any) -> float | None:
 
 def distrust(result: Any) -> str | None:
     """Return why numbers of a record are not to be trusted, in words; None where nothing says so."""
-    # Without what is tried of a record alone, which takes as long as to identify it.
-    return found_marked(result._chosen.advice) or _distrusted(result, lambda: explained(result))  # noqa: SLF001 - of this room
+    # Without what is tried of a record alone, which takes as long as to identify it, but where something is seen that spoils it.
+    advice = result._chosen.advice  # noqa: SLF001 - of this room
+    if any(STAYS in line for line in advice):
+        advice = result.advice
+    return found_marked(advice) or _distrusted(result, lambda: explained(result)) or _found_elsewhere(advice)
 
 
 def _distrusted(result: Any, share: Callable[[], float | None]) -> str | None:

@@ -20,6 +20,9 @@ OTHER_UNIT = ("degrees?", "is the time in ")
 MARKED = "does it mark values that are missing?"
 """How advice asks about numbers that may never have been measured."""
 
+STAYS = "or use method='auto', which "
+"""How advice goes on about what spoils windows of the strong form, which nothing took out."""
+
 FED_BACK = "the torque holds the angle's noise"
 UNTOLD_LAG = "the record does not tell half a sample of lag"
 CONDITIONS = (FED_BACK, UNTOLD_LAG)

@@ -19,12 +19,13 @@ const WINDOWS: [(usize, usize, usize); 2] = [(10, 5, 2), (5, 3, 1)];
 /// How many steps show that the recorder loses samples.
 const ENOUGH: usize = 3;
 
-/// At how many places the angle jumps between two samples, unless a recorder did something else to it, too; the torque may. Costs some 10 ns a sample.
+/// At how many places the angle jumps between two samples, unless a recorder did something else to it, too; the torque may. Costs some 10 ns a sample: shifts
+/// of time are not looked for.
 ///
 /// # Errors
 /// If the watch cancels.
 pub fn break_counts(angle: &dyn Samples, _: &dyn Samples, watch: &mut Watch<'_>) -> Result<[usize; 2], Error> {
-    let of_angle = if defects(angle).is_empty() { breaks(angle, watch)?.len() } else { 0 };
+    let of_angle = if defects(angle).is_empty() { steps(angle, quantisation_step(angle), watch)?.len() } else { 0 };
     Ok([of_angle, 0])
 }
 
@@ -34,6 +35,17 @@ pub fn break_counts(angle: &dyn Samples, _: &dyn Samples, watch: &mut Watch<'_>)
 /// If the watch cancels.
 pub(crate) fn breaks(angle: &dyn Samples, watch: &mut Watch<'_>) -> Result<Vec<usize>, Error> {
     let quantum = quantisation_step(angle);
+    let mut found = steps(angle, quantum, watch)?;
+    if found.len() >= ENOUGH {
+        let more = shifts(angle, quantum, &found, watch)?;
+        found.extend(more);
+        found.sort_unstable();
+    }
+    Ok(found)
+}
+
+/// The borders at which an angle that was rounded to a `quantum` has a step, in order.
+fn steps(angle: &dyn Samples, quantum: f64, watch: &mut Watch<'_>) -> Result<Vec<usize>, Error> {
     let mut found: Vec<usize> = Vec::new();
     for (half, degree, changing) in WINDOWS {
         let more = Steps::new(half, degree, changing).find(angle, quantum, &found, watch)?;
@@ -41,11 +53,6 @@ pub(crate) fn breaks(angle: &dyn Samples, watch: &mut Watch<'_>) -> Result<Vec<u
         if found.is_empty() && more.is_empty() {
             return Ok(found);
         }
-        found.extend(more);
-        found.sort_unstable();
-    }
-    if found.len() >= ENOUGH {
-        let more = shifts(angle, quantum, &found, watch)?;
         found.extend(more);
         found.sort_unstable();
     }
