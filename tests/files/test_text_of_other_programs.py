@@ -292,3 +292,21 @@ def test_separators_alone_below_the_names_are_no_sample(tmp_path: Path, separato
     with pytest.warns(recordings.FileWarning, match="the first 2 rows hold nothing: not read"):
         found = recordings.read(path)
     np.testing.assert_array_equal(found["angle"], np.arange(30) + 0.5)
+
+
+@pytest.mark.parametrize(
+    ("cells", "seconds"),
+    [
+        (["0 sec", "0.002 sec", "0.004 sec"], [0, 0.002, 0.004]),
+        (["0 ms", "2 ms", "4 ms"], [0, 0.002, 0.004]),
+        (["58 sec", "1 min", "1.5 min"], [58, 60, 90]),
+        (["-1 hr", "0 hr", "1 day"], [-3600, 0, 86_400]),
+    ],
+)
+def test_durations_of_matlab_are_times(tmp_path: Path, cells: list[str], seconds: list[float]) -> None:
+    """What writetimetable writes was refused: "'0 sec' is no number, nor a time that is known"."""
+    (tmp_path / "x.csv").write_text("Time,angle\n" + "".join(f"{cell},{place}.5\n" for place, cell in enumerate(cells)))
+    with pytest.warns(recordings.FileWarning, match="column 'Time' holds times"):
+        found = tvident.read_recording(tmp_path / "x.csv")
+    np.testing.assert_allclose(found["Time"], seconds, rtol=1e-12)
+    assert found.units["Time"] == "s"

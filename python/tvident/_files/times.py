@@ -37,6 +37,22 @@ _FORMS = tuple(
 )
 _DAY, _HOUR = 86_400, 3600
 
+_DURATION = re.compile(
+    r"(?P<value>[+-]?\d{1,12}(?:[.,]\d{1,15})?(?:[eE][+-]?\d{1,2})?)\s(?P<unit>ms|sec|min|hr|days?)", re.ASCII
+)
+"""How MATLAB writes a duration."""
+_LASTS = {
+    "ms": 10**6,
+    "sec": 10**9,
+    "min": 60 * 10**9,
+    "hr": 3600 * 10**9,
+    "day": 86_400 * 10**9,
+    "days": 86_400 * 10**9,
+}
+_ENDS_OF_DURATIONS = frozenset(unit[-1] for unit in _LASTS)
+_NEVER = 10**12
+"""Seconds after which a duration begins again."""
+
 _MILLI = 3
 """Digits of milliseconds."""
 
@@ -62,6 +78,9 @@ Order = Literal["day", "month"] | None
 
 def instant(cell: str, order: Order = None) -> Instant | None:
     """Return the time that a cell holds, None where it holds anything else."""
+    if cell[-1:] in _ENDS_OF_DURATIONS and (lasting := _DURATION.fullmatch(cell)):
+        lasts = round(float(lasting["value"].replace(",", ".")) * _LASTS[lasting["unit"]])
+        return Instant(lasts, is_dated=False, wraps=_NEVER)
     if not cell[:1].isdigit() or not (":" in cell or cell[-4:].isdigit() or cell[:4].isdigit()):
         return None
     for form in _FORMS:
