@@ -140,6 +140,10 @@ def test_numbers_that_are_not_plausible_are_asked_about() -> None:
     assert "the angle reaches" in advice(degrees, RIG.torque)
     assert "160: degrees?" in advice(degrees, RIG.torque)
     assert "degrees?" not in advice(degrees, RIG.torque, angle_unit="deg")
+    counts = np.round(RIG.angle / (2 * np.pi) * 8192)
+    assert "in whole numbers: counts of an encoder, or degrees?" in advice(counts, RIG.torque)
+    first = tvident.identify(counts, RIG.torque, sample_rate=1000).summary().splitlines()[0]
+    assert first.endswith("all in other units if a channel is: see what to do")
     doubtful, known = (
         tvident.identify(degrees, RIG.torque, sample_rate=1000, angle_unit=unit).summary().splitlines()[0]
         for unit in (None, "deg")

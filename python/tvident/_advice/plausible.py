@@ -90,9 +90,16 @@ class Plausible:
         if most - least <= 2 * _ONE_TURN:
             return []
         reach = max(least, most, key=abs)
-        turns = (most - least) / _ONE_TURN
+        turns = f"As rad it moves through {(most - least) / _ONE_TURN:.3g} turns"
+        # An angle in degrees has fractions, unless it was rounded.
+        is_whole = np.array_equal(finite, np.round(finite))
+        what, more = (
+            (", in whole numbers: counts of an encoder, or", " multiply counts by 2π over those of a turn;")
+            if is_whole
+            else (":", "")
+        )
         return [
-            f"the angle reaches {reach:.4g}: degrees? As rad it moves through {turns:.3g} turns; if it is in degrees, give angle_unit='deg'"
+            f"the angle reaches {reach:.4g}{what} degrees? {turns};{more} if it is in degrees, give angle_unit='deg'"
         ]
 
     def _slow(self) -> list[str]:
