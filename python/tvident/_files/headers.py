@@ -10,7 +10,7 @@ from tvident._files.channels import FileError, Say
 from tvident._files.names import listed, printable
 from tvident._files.oscilloscopes import names_of_keys
 from tvident._files.row_names import have_row_names
-from tvident._units import is_unit, named_unit, unit_of, with_unit, without_brackets
+from tvident._units import ROTARY, is_convertible, is_unit, named_unit, unit_of, with_unit, without_brackets
 
 CURE = "export the channels as columns of numbers with a point as the decimal sign"
 
@@ -405,8 +405,10 @@ def _are_units(cells: Sequence[str]) -> bool:
 
 
 def _with_unit(name: str, unit: str) -> str:
-    """Return a name with the unit of another line, unless it has one itself."""
+    """Return a name with the unit of another line, unless it has one itself; what has no name and a unit of times is a time."""
     bare = without_brackets(unit)
+    if not name and is_convertible(ROTARY, "time", bare):
+        return with_unit("time", bare)
     return name if named_unit(name)[1] else with_unit(name, bare)
 
 
