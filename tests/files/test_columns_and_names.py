@@ -231,3 +231,19 @@ def test_what_is_empty_beside_channels_is_said(tmp_path: Path, name: str) -> Non
     with pytest.warns(recordings.FileWarning, match=r"without samples: 'torque'$"):
         found = tvident.read_recording(path)
     assert "torque" not in found
+
+
+@pytest.mark.parametrize(("late", "rate"), [(0.0005, None), (1e-6, 500), (0.0, 500)])
+def test_clocks_of_one_name_that_differ_are_two(tmp_path: Path, late: float, rate: float | None) -> None:
+    """The first was the clock of all: a torque that was sampled a quarter of a step later was not said to be."""
+    lines = [f"{k / 500:.7f};{k % 7};{k / 500 + late:.7f};{k % 5}\n" for k in range(100)]
+    (tmp_path / "x.csv").write_text("t1 [s];angle [rad];t2 [s];torque [Nm]\n" + "".join(lines))
+    found = tvident.read_recording(tmp_path / "x.csv")
+    if rate is not None:
+        assert found.sample_rate == pytest.approx(rate)
+        return
+    assert found.time is None
+    with pytest.raises(
+        ValueError, match=r"has several: t1, t2; give the clocks of angle and torque, such as t=\(recording\['t1'\]"
+    ):
+        _ = found.sample_rate

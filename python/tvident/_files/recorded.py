@@ -36,6 +36,9 @@ _PERIOD = re.compile(r"(ts|dt|delta_?t|t_?sample|t_?samp|sampl(e|ing)_?(time|per
 """What single numbers are called that are samples per second, and seconds per sample."""
 
 
+_NUMBERED = re.compile(r"[\s_.]*\d+$")
+"""What tells clocks of one name apart, as time_2 and t1."""
+
 _NOTABLE = 0.01
 """Of a rate: times have few digits, and recorders round what they state."""
 
@@ -220,9 +223,10 @@ class FileRecording(Mapping[str, Channel]):
         grouped = [name for name, values in long.items() if arguments.is_time(name.rpartition(".")[2], values.unit)]
         # A clock that is called more closely, as that of the system, may have begun long before.
         found.sort(key=len)
-        called = found[:1] or (grouped if len(grouped) == 1 else increasing_times(long))
+        alike = [name for name in found if _NUMBERED.sub("", name) == _NUMBERED.sub("", found[0])]
+        called = alike or (grouped if len(grouped) == 1 else increasing_times(long))
         # Groups that were sampled together have one clock.
-        called = called[:1] if all(np.array_equal(long[called[0]], long[name]) for name in called[1:]) else called
+        called = called[:1] if all(_is_one_clock(long[called[0]], long[name]) for name in called[1:]) else called
         return long[called[0]] if len(called) == 1 else None
 
     def _cure_of_times(self) -> str:
@@ -411,3 +415,17 @@ def said_otherwise(path: Path, channels: Mapping[str, npt.NDArray[Any]]) -> str:
     if abs(shown / stated.rate - 1) < _NOTABLE:
         return ""
     return f"it states '{stated.words}', {stated.rate:.6g} Hz, and its times show {shown:.6g} Hz, which is used: check which is right"
+
+
+def _is_one_clock(one: Channel, other: Channel) -> bool:
+    """Return whether two channels of times show the same, or differ by less than a hundredth of a step, as rounding makes them."""
+    if one.shape != other.shape:
+        return False
+    if np.array_equal(one, other):
+        return True
+    try:
+        first, second = (np.asarray(times_in_seconds(clock), np.float64) for clock in (one, other))
+    except UnitError:
+        return False
+    step = float(np.median(np.abs(np.diff(first))))
+    return bool(np.max(np.abs(first - second)) < _NOTABLE * step)
