@@ -15,7 +15,8 @@ progress to standard error, so `-o -` can be piped. The exit status is 0, 2 for 
 file cannot be used. Ctrl-C stops at once; files appear whole or not at all, keep the mode of those that they replace, and never
 replace what is read. The command comes with `pip install 'tvident[cli]'`; where the program is not on the path,
 `python -m tvident` runs it. `--settings` takes a TOML file of options, such as
-`inertia = 0.0123` and `term = ["coulomb"]`, what `--settings-output` wrote, or a result: NPZ and Parquet files hold
+`inertia = 0.0123` and `term = ["coulomb"]`, for several commands in tables such as `[identify]`; what
+`--settings-output` wrote, or a result: NPZ and Parquet files hold
 their settings, beside others stands a file with `.settings.json` behind the name of the result. So a run can be repeated from what
 it wrote, to the last digit. With `--json` standard output is one JSON object whatever happens: an error is
 `{"error": "…", "exit_status": 1}`. `tvident completion` prints what makes bash, zsh and fish complete.
