@@ -199,10 +199,8 @@ impl GroupSamples {
             sums.add(simd, degrees, &times, &weights, &samples);
             at += AT_ONCE;
         }
-        factor.below.0[0] = sums.products.0;
-        factor.decompose(simd, degrees, &sums.moments.0, 1);
-        let mut coefficients = OnLines(factor.below.0[0]);
-        factor.solve(simd, degrees, &mut coefficients);
+        factor.decompose(simd, degrees, &sums.moments.0, &sums.products.0, &[zero; MOST]);
+        let coefficients = factor.solve(simd, degrees);
         let mut off = TakenOff::new(simd, coefficients);
         for at in (0..end).step_by(AT_ONCE) {
             let times = rows(simd, &self.times, at);

@@ -29,19 +29,20 @@ pub(crate) struct OrderShares<S: Lanes> {
 }
 
 impl<S: Lanes> SharedChoice<S> {
-    /// What of orthogonal polynomials is to be added to the one that was taken off: all of `own` up to the order, and above it minus what that has.
+    /// What of orthogonal polynomials is to be added to the one that was taken off: all of `own` up to the order, and above it minus what that has,
+    /// over each polynomial's sum of squares.
     #[inline(always)]
     pub(crate) fn left(
         &self,
         simd: S,
         degrees: usize,
-        own: &[S::f64s; MOST],
-        off: &[S::f64s; MOST],
+        [own, off, inverse]: [&[S::f64s; MOST]; 3],
         left: &mut [S::f64s; MOST],
     ) {
         for k in 0..degrees.min(MOST) {
             let is_above = simd.less_than_f64s(self.order, simd.splat_f64s(k as f64));
-            left[k] = simd.select_f64s(is_above, simd.neg_f64s(off[k]), own[k]);
+            let part = simd.select_f64s(is_above, simd.neg_f64s(off[k]), own[k]);
+            left[k] = simd.mul_f64s(part, inverse[k]);
         }
     }
 }

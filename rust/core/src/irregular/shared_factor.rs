@@ -1,7 +1,14 @@
-//! The factor of the normal matrix of windows that share a basis: a window in each lane.
+//! The polynomials that are orthogonal in windows that share a basis: a window in each lane.
 //!
-//! `G = L D L'` by columns. Rows below the matrix are what is solved for: of `b` there stays `L⁻¹ b`, whose place `k` belongs to the polynomial of order `k`
-//! that is orthogonal to all lower ones in this window.
+//! Their recurrence of three terms, and with it the factor `G = L D L'` of the normal matrix, follows from the sums of `T_0 .. T_2p` by Chebyshev's
+//! algorithm (Sack and Donovan 1972, Wheeler 1974). With `π_{k+1} = (2 u - α_k) π_k - β_k π_{k-1}` the products `σ_{k,l} = Σ π_k T_l` are
+//!
+//! ```text
+//! σ_{0,l} = Σ T_l,    σ_{k+1,l} = σ_{k,l+1} + σ_{k,|l-1|} - α_k σ_{k,l} - β_k σ_{k-1,l},
+//! ```
+//!
+//! where `α_k` and `β_k` make the next products with lower `T_l` zero. `σ_{k,l}` is `D L'`: what is solved for is eliminated by each row
+//! as soon as it is known, so that nothing but two rows of products is kept. No number of a row waits for another.
 
 use pulp::NullaryFnOnce;
 
@@ -9,217 +16,409 @@ use crate::irregular::shared_sums::{DERIVATIVES, MOST};
 use crate::simd::aligned::OnLines;
 use crate::simd::vectors::Lanes;
 
-/// Numbers of a row that are solved for together.
-const ABREAST: usize = 4;
-
-/// Rows below the matrix at most: the samples, one for the condition, and derivatives.
-const BELOW: usize = 2 + DERIVATIVES;
-
-/// Rows that are eliminated together, if there are more than half as many; otherwise half as many are. Those after the last belong to nothing.
-const TOGETHER: usize = 8;
-const BEYOND: usize = TOGETHER / 2;
-
-/// A matrix and what is solved with it.
+/// Orthogonal polynomials and what they find in the samples.
 pub(crate) struct SharedFactor<S: Lanes> {
-    /// `L D`.
-    pub(crate) rows: OnLines<[S::f64s; MOST], { MOST + BEYOND }>,
-    /// `L⁻¹ b`: that of the samples, of one for the condition, and of derivatives.
-    pub(crate) below: OnLines<[S::f64s; MOST], BELOW>,
-    /// One over each pivot.
+    /// `L⁻¹ b` of the samples: their products with each polynomial.
+    pub(crate) own: OnLines<S::f64s, MOST>,
+    /// `L⁻¹ b` of a row that is made to grow: for the condition.
+    pub(crate) grown: OnLines<S::f64s, MOST>,
+    /// `V' a`: what the polynomial with coefficients `a` in the shared basis has in each.
+    pub(crate) turned: OnLines<S::f64s, MOST>,
+    /// One over each polynomial's sum of squares.
     pub(crate) inverse: OnLines<S::f64s, MOST>,
-    /// The largest ratio of a diagonal to its pivot.
+    /// The largest ratio of a diagonal of the normal matrix to its pivot.
     pub(crate) weakest: S::f64s,
-    /// Halves of moments, and minus the row of a pivot over the pivots before.
-    halves: OnLines<S::f64s, { 2 * MOST + BEYOND }>,
-    factors: OnLines<S::f64s, MOST>,
+    steps: OnLines<Step<S::f64s>, MOST>,
+    /// Products with the shared polynomials: of the last orthogonal one and of the one before.
+    products: OnLines<[S::f64s; 2 * MOST], 2>,
 }
 
 impl<S: Lanes> SharedFactor<S> {
     #[inline(always)]
     pub(crate) fn zero(simd: S) -> Self {
         let zero = simd.splat_f64s(0.0);
-        let (rows, below) = (OnLines([[zero; MOST]; MOST + BEYOND]), OnLines([[zero; MOST]; BELOW]));
-        let (halves, factors) = (OnLines([zero; 2 * MOST + BEYOND]), OnLines([zero; MOST]));
-        Self { rows, below, inverse: OnLines([zero; MOST]), weakest: zero, halves, factors }
+        let column = OnLines([zero; MOST]);
+        Self {
+            own: column.clone(),
+            grown: column.clone(),
+            turned: column.clone(),
+            inverse: column,
+            weakest: zero,
+            steps: OnLines([Step { alpha: zero, beta: zero }; MOST]),
+            products: OnLines([[zero; 2 * MOST]; 2]),
+        }
     }
 
-    /// Decomposes the matrix that moments make; so many rows below it hold what is to be solved for.
+    /// Finds the polynomials from the moments of windows, the products of samples with them, and what a sum of shared polynomials has in each.
     #[inline(always)]
-    pub(crate) fn decompose(&mut self, simd: S, degrees: usize, moments: &[S::f64s; 2 * MOST], below: usize) {
-        let (degrees, half) = (degrees.min(MOST), simd.splat_f64s(0.5));
-        if below > 1 {
-            self.below.0[1][..degrees].fill(simd.splat_f64s(0.0));
-        }
-        for (value, moment) in self.halves.0.iter_mut().zip(moments).take(2 * degrees - 1) {
-            *value = simd.mul_f64s(*moment, half);
-        }
+    pub(crate) fn decompose(
+        &mut self,
+        simd: S,
+        degrees: usize,
+        moments: &[S::f64s; 2 * MOST],
+        samples: &[S::f64s; MOST],
+        coefficients: &[S::f64s; MOST],
+    ) {
         self.weakest = simd.splat_f64s(1.0);
-        simd.vectorize(EliminatedColumns { simd, factor: self, degrees, below });
+        let given = Given { moments, samples, coefficients };
+        simd.vectorize(EliminatedRows { simd, factor: self, degrees: degrees.min(MOST), given });
     }
 
-    /// The solution `G⁻¹ b` of what stays of `b`, in its place.
+    /// The coefficients in the shared basis of the polynomial that fits the samples best.
     #[inline(always)]
-    pub(crate) fn solve(&self, simd: S, degrees: usize, solution: &mut OnLines<S::f64s, MOST>) {
-        let degrees = degrees.min(MOST);
-        for first in (0..degrees).step_by(ABREAST).rev() {
-            let end = degrees.min(first + ABREAST);
-            let mut sums = [simd.splat_f64s(0.0); ABREAST];
-            sums.copy_from_slice(&solution.0[first..][..ABREAST]);
-            // A row of `L D` is a column of `D L'`, and what is on the other side has not been divided by `D` yet.
-            for (row, scaled) in self.rows.0[end..degrees].iter().zip(&solution.0[end..degrees]).rev() {
-                let row = &row[first..][..ABREAST];
-                for n in 0..ABREAST {
-                    sums[n] = simd.negate_mul_add_f64s(row[n], *scaled, sums[n]);
-                }
+    pub(crate) fn solve(&self, simd: S, degrees: usize) -> OnLines<S::f64s, MOST> {
+        let (zero, half) = (simd.splat_f64s(0.0), simd.splat_f64s(0.5));
+        let mut solution = OnLines([zero; MOST]);
+        // Coefficients of two orthogonal polynomials, the lowest of each twice: `2 u` takes them to both neighbours, of which the lowest has one.
+        let (mut one, mut other) = (OnLines([zero; MOST + 2]), OnLines([zero; MOST + 2]));
+        let (mut last, mut before) = (&mut one, &mut other);
+        last.0[0] = simd.splat_f64s(2.0);
+        for (k, Step { alpha, beta }) in self.steps.0.iter().enumerate().take(degrees.min(MOST)) {
+            let scaled = simd.mul_f64s(self.own.0[k], self.inverse.0[k]);
+            let mut lower = last.0[1];
+            let step = if k == 0 { half } else { simd.splat_f64s(1.0) };
+            for l in 0..=k {
+                let (same, higher) = (last.0[l], last.0[l + 1]);
+                solution.0[l] = simd.mul_add_f64s(same, scaled, solution.0[l]);
+                let value = simd.mul_f64s(simd.add_f64s(lower, higher), step);
+                let value = simd.negate_mul_add_f64s(*alpha, same, value);
+                before.0[l] = simd.negate_mul_add_f64s(*beta, before.0[l], value);
+                lower = same;
             }
-            let (rows, inverse) = (&self.rows.0[first..][..ABREAST], &self.inverse.0[first..][..ABREAST]);
-            for n in (0..ABREAST).rev() {
-                if first + n < end {
-                    let (row, scaled) = (&rows[n][first..][..ABREAST], simd.mul_f64s(sums[n], inverse[n]));
-                    for (sum, factor) in sums.iter_mut().zip(row).take(n) {
-                        *sum = simd.negate_mul_add_f64s(*factor, scaled, *sum);
-                    }
-                    sums[n] = scaled;
-                }
-            }
-            solution.0[first..][..ABREAST].copy_from_slice(&sums);
+            before.0[k + 1] = simd.mul_f64s(lower, step);
+            std::mem::swap(&mut last, &mut before);
         }
+        solution.0[0] = simd.mul_f64s(solution.0[0], half);
+        solution
     }
 
-    /// `V' a`: what the polynomial with coefficients `a` in the shared basis has in the orthogonal one of each window.
+    /// The orthogonal polynomials and their derivatives at a time: by derivative, then by degree.
     #[inline(always)]
-    pub(crate) fn turned(&self, simd: S, degrees: usize, coefficients: &[S::f64s; MOST], turned: &mut [S::f64s; MOST]) {
-        let degrees = degrees.min(MOST);
-        for first in (0..degrees).step_by(ABREAST) {
-            let end = degrees.min(first + ABREAST);
-            let mut sums = [simd.splat_f64s(0.0); ABREAST];
-            for last in 0..ABREAST {
-                if first + last < end {
-                    let row = &self.rows.0[first + last][first..][..ABREAST];
-                    for (sum, value) in sums.iter_mut().zip(row).take(last + 1) {
-                        *sum = simd.mul_add_f64s(*value, coefficients[first + last], *sum);
-                    }
-                }
-            }
-            for (row, coefficient) in self.rows.0[end..degrees].iter().zip(&coefficients[end..degrees]) {
-                let row = &row[first..][..ABREAST];
-                for n in 0..ABREAST {
-                    sums[n] = simd.mul_add_f64s(row[n], *coefficient, sums[n]);
-                }
-            }
-            turned[first..][..ABREAST].copy_from_slice(&sums);
+    pub(crate) fn at(&self, simd: S, degrees: usize, time: S::f64s, derivatives: &mut [[S::f64s; MOST]]) {
+        match derivatives {
+            [_] => self.at_with::<1>(simd, degrees, time, derivatives),
+            [_, _] => self.at_with::<2>(simd, degrees, time, derivatives),
+            [_, _, _] => self.at_with::<3>(simd, degrees, time, derivatives),
+            _ => self.at_with::<DERIVATIVES>(simd, degrees, time, derivatives),
         }
     }
 
-    /// Takes the columns before off a column, and finds its pivot.
     #[inline(always)]
-    fn column(&mut self, simd: S, (degrees, below): (usize, usize), column: usize) {
-        let diagonal = simd.add_f64s(self.halves.0[2 * column], self.halves.0[0]);
-        let (halves, factors) = (&self.halves.0, &mut self.factors.0);
-        let pivots = self.rows.0[column].iter().zip(&self.inverse.0);
-        for (factor, (value, inverse)) in factors.iter_mut().zip(pivots).take(column) {
-            *factor = simd.neg_f64s(simd.mul_f64s(*value, *inverse));
-        }
-        // Two rows below the matrix go with its first ones: alone they would wait for each other.
-        let (pair, others) = self.below.0.split_at_mut(2);
-        let mut pair = &mut *pair;
-        let mut row = column;
-        while row < degrees {
-            let is_long = row + BEYOND < degrees;
-            let sums = [&halves[row + column..], &halves[row - column..]];
-            if let (true, Some(rows)) = (is_long, self.rows.0[row..].first_chunk_mut::<TOGETHER>()) {
-                eliminate_with(simd, rows, std::mem::take(&mut pair), (factors, column), sums);
-            } else if let Some(rows) = self.rows.0[row..].first_chunk_mut::<BEYOND>() {
-                eliminate_with(simd, rows, std::mem::take(&mut pair), (factors, column), sums);
+    fn at_with<const N: usize>(&self, simd: S, degrees: usize, time: S::f64s, derivatives: &mut [[S::f64s; MOST]]) {
+        let (zero, twice) = (simd.splat_f64s(0.0), simd.add_f64s(time, time));
+        let (mut last, mut before) = ([zero; N], [zero; N]);
+        last[0] = simd.splat_f64s(1.0);
+        for (k, Step { alpha, beta }) in self.steps.0.iter().enumerate().take(degrees.min(MOST)) {
+            // The first step has half of `2 u`.
+            let (at, slope) = if k == 0 { (time, 1.0) } else { (twice, 2.0) };
+            let along = simd.sub_f64s(at, *alpha);
+            let mut lower = zero;
+            for derivative in 0..N {
+                if let Some(values) = derivatives.get_mut(derivative) {
+                    values[k] = last[derivative];
+                }
+                let raised = simd.mul_f64s(*beta, before[derivative]);
+                let raised = simd.mul_add_f64s(along, last[derivative], simd.neg_f64s(raised));
+                let factor = simd.splat_f64s(slope * derivative as f64);
+                (before[derivative], lower, last[derivative]) =
+                    (last[derivative], last[derivative], simd.mul_add_f64s(factor, lower, raised));
             }
-            row += if is_long { TOGETHER } else { BEYOND };
         }
-        for rows in others.as_chunks_mut::<2>().0.iter_mut().take(below.div_ceil(2) - 1) {
-            eliminate::<S, 0, 2>(simd, &mut [], rows, (factors, column), [&[]; 2]);
+    }
+
+    /// Takes two polynomials off all higher ones, and finds the products of the next two. The first two are found in what is given.
+    #[inline(always)]
+    fn pair<const FIRST: bool>(&mut self, simd: S, degrees: usize, k: usize, given: &Given<'_, S>) {
+        let Self { own, grown, turned, inverse, weakest, steps, products } = self;
+        let (own, grown) = (&mut own.0, &mut grown.0);
+        let Given { moments, coefficients, .. } = *given;
+        let [rows, before] = &mut products.0;
+        let pivot = given.product::<FIRST>(rows, k);
+        let mut one = ReducedRow::new(simd, pivot, coefficients[k]);
+        one.compare(simd, [moments[2 * k], moments[0]], weakest);
+        inverse.0[k] = one.inverse;
+        [own[k], grown[k]] = one.take(simd, given.below::<FIRST>(simd, [own, grown], k));
+        turned.0[k] = one.turned;
+        if k + 1 == degrees {
+            return;
         }
-        if below > 1 {
-            let grown = &mut self.below.0[1][column];
-            let is_negative = simd.less_than_f64s(*grown, simd.splat_f64s(0.0));
-            let one = simd.splat_f64s(1.0);
-            *grown = simd.add_f64s(*grown, simd.select_f64s(is_negative, simd.neg_f64s(one), one));
+        let next = given.product::<FIRST>(rows, k + 1);
+        let beta = if FIRST { simd.splat_f64s(0.0) } else { simd.mul_f64s(pivot, inverse.0[k - 1]) };
+        let left = if FIRST { next } else { simd.negate_mul_add_f64s(beta, before[k], next) };
+        let step = Step { alpha: simd.mul_f64s(left, one.inverse), beta };
+        let higher = given.product::<FIRST>(rows, k + 2);
+        let second = step.next::<S, FIRST>(simd, [pivot, next, higher], before[k + 1]);
+        let mut two = ReducedRow::new(simd, second, coefficients[k + 1]);
+        two.compare(simd, [moments[2 * k + 2], moments[0]], weakest);
+        inverse.0[k + 1] = two.inverse;
+        let reduced = one.eliminate(simd, next, coefficients[k + 1], given.below::<FIRST>(simd, [own, grown], k + 1));
+        [own[k + 1], grown[k + 1]] = two.take(simd, reduced);
+        steps.0[k] = step;
+        if k + 2 < degrees {
+            let third = step.next::<S, FIRST>(simd, [next, higher, given.product::<FIRST>(rows, k + 3)], before[k + 2]);
+            let beta = simd.mul_f64s(second, one.inverse);
+            let beta = if FIRST { simd.add_f64s(beta, beta) } else { beta };
+            let alpha = simd.mul_f64s(simd.negate_mul_add_f64s(beta, next, third), two.inverse);
+            steps.0[k + 1] = Step { alpha, beta };
+            let mut pass = PassedPair {
+                steps: [step, steps.0[k + 1]],
+                first: [higher, given.product::<FIRST>(rows, k + 3)],
+                second: [second, third],
+            };
+            for l in k + 2..degrees {
+                let reduced =
+                    one.eliminate(simd, pass.first[0], coefficients[l], given.below::<FIRST>(simd, [own, grown], l));
+                [own[l], grown[l]] = two.eliminate(simd, pass.second[1], coefficients[l], reduced);
+                let higher = given.product::<FIRST>(rows, l + 2);
+                pass.go::<FIRST>(simd, higher, [&mut rows[l..=l], &mut before[l..l + 2]]);
+            }
+            for l in degrees..2 * degrees - 3 - k {
+                let higher = given.product::<FIRST>(rows, l + 2);
+                pass.go::<FIRST>(simd, higher, [&mut rows[l..=l], &mut before[l..l + 2]]);
+            }
         }
-        let inverse = simd.div_f64s(simd.splat_f64s(1.0), self.rows.0[column][column]);
-        self.inverse.0[column] = inverse;
-        let ratio = simd.mul_f64s(diagonal, inverse);
-        // Where a pivot is negative or no number, so is the ratio: it counts as infinite.
-        let counts = simd.greater_than_or_equal_f64s(ratio, simd.splat_f64s(0.5));
-        let ratio = simd.select_f64s(counts, ratio, simd.splat_f64s(f64::INFINITY));
-        self.weakest = simd.max_f64s(self.weakest, ratio);
+        turned.0[k] = one.turned;
+        turned.0[k + 1] = two.turned;
     }
 }
 
-/// All columns, one after the other: compiled apart from what uses them, each for itself.
-struct EliminatedColumns<'a, S: Lanes> {
+/// What is known of windows.
+#[derive(Clone, Copy)]
+struct Given<'a, S: Lanes> {
+    moments: &'a [S::f64s; 2 * MOST],
+    samples: &'a [S::f64s; MOST],
+    /// Of what was taken off.
+    coefficients: &'a [S::f64s; MOST],
+}
+
+impl<S: Lanes> Given<'_, S> {
+    /// A product of the last orthogonal polynomial; of the first it is a moment.
+    #[inline(always)]
+    fn product<const FIRST: bool>(&self, rows: &[S::f64s; 2 * MOST], l: usize) -> S::f64s {
+        if FIRST { self.moments[l] } else { rows[l] }
+    }
+
+    /// What is solved for of a row, and of the one that is made to grow.
+    #[inline(always)]
+    fn below<const FIRST: bool>(&self, simd: S, [own, grown]: [&[S::f64s; MOST]; 2], l: usize) -> [S::f64s; 2] {
+        if FIRST { [self.samples[l], simd.splat_f64s(0.0)] } else { [own[l], grown[l]] }
+    }
+}
+
+/// A row of products by which what is solved for is eliminated.
+struct ReducedRow<S: Lanes> {
+    /// One over the pivot, and minus what is solved for over it.
+    inverse: S::f64s,
+    own: S::f64s,
+    grown: S::f64s,
+    turned: S::f64s,
+}
+
+impl<S: Lanes> ReducedRow<S> {
+    #[inline(always)]
+    fn new(simd: S, pivot: S::f64s, coefficient: S::f64s) -> Self {
+        let (one, zero) = (simd.splat_f64s(1.0), simd.splat_f64s(0.0));
+        let inverse = simd.div_f64s(one, pivot);
+        Self { inverse, own: zero, grown: zero, turned: simd.mul_f64s(pivot, coefficient) }
+    }
+
+    /// Compares the diagonal of the normal matrix, half the sum of two moments, with the pivot.
+    #[inline(always)]
+    fn compare(&self, simd: S, [one, other]: [S::f64s; 2], weakest: &mut S::f64s) {
+        let half = simd.splat_f64s(0.5);
+        let ratio = simd.mul_f64s(simd.mul_f64s(simd.add_f64s(one, other), half), self.inverse);
+        // Where a pivot is negative or no number, so is the ratio: it counts as infinite.
+        let counts = simd.greater_than_or_equal_f64s(ratio, half);
+        *weakest = simd.max_f64s(*weakest, simd.select_f64s(counts, ratio, simd.splat_f64s(f64::INFINITY)));
+    }
+
+    /// What is solved for is known of this row; the row that is made to grow does.
+    #[inline(always)]
+    fn take(&mut self, simd: S, [own, grown]: [S::f64s; 2]) -> [S::f64s; 2] {
+        let (zero, one) = (simd.splat_f64s(0.0), simd.splat_f64s(1.0));
+        let is_negative = simd.less_than_f64s(grown, zero);
+        let grown = simd.add_f64s(grown, simd.select_f64s(is_negative, simd.neg_f64s(one), one));
+        self.own = simd.neg_f64s(simd.mul_f64s(own, self.inverse));
+        self.grown = simd.neg_f64s(simd.mul_f64s(grown, self.inverse));
+        [own, grown]
+    }
+
+    /// Eliminates what is solved for of a higher row.
+    #[inline(always)]
+    fn eliminate(
+        &mut self,
+        simd: S,
+        product: S::f64s,
+        coefficient: S::f64s,
+        [own, grown]: [S::f64s; 2],
+    ) -> [S::f64s; 2] {
+        self.turned = simd.mul_add_f64s(product, coefficient, self.turned);
+        [simd.mul_add_f64s(product, self.own, own), simd.mul_add_f64s(product, self.grown, grown)]
+    }
+}
+
+/// A step of the recurrence.
+#[derive(Clone, Copy)]
+struct Step<V> {
+    alpha: V,
+    beta: V,
+}
+
+impl<V: Copy> Step<V> {
+    /// The product of the next polynomial from three of the last, and one of that before; the first step has half of `2 u` and nothing before.
+    #[inline(always)]
+    fn next<S: Lanes<f64s = V>, const FIRST: bool>(self, simd: S, [lower, same, higher]: [V; 3], before: V) -> V {
+        let both = simd.add_f64s(lower, higher);
+        if FIRST {
+            return simd.negate_mul_add_f64s(self.alpha, same, simd.mul_f64s(both, simd.splat_f64s(0.5)));
+        }
+        // `α` is known last.
+        simd.negate_mul_add_f64s(self.alpha, same, simd.negate_mul_add_f64s(self.beta, before, both))
+    }
+}
+
+/// Two rows of products that are replaced by the next two in one pass: in registers is what lies beside the place that the pass is at.
+struct PassedPair<S: Lanes> {
+    steps: [Step<S::f64s>; 2],
+    /// Of the first row at the place and at the one after it; of the second at the one before it and at the place.
+    first: [S::f64s; 2],
+    second: [S::f64s; 2],
+}
+
+impl<S: Lanes> PassedPair<S> {
+    /// Replaces the products at a place; `higher` is that of the first row two places on.
+    #[inline(always)]
+    fn go<const FIRST: bool>(&mut self, simd: S, higher: S::f64s, [row, before]: [&mut [S::f64s]; 2]) {
+        let [[same, next], [below, second]] = [self.first, self.second];
+        let above = self.steps[0].next::<S, FIRST>(simd, [same, next, higher], before[1]);
+        before[0] = second;
+        row[0] = self.steps[1].next::<S, false>(simd, [below, second, above], same);
+        (self.first, self.second) = ([next, higher], [second, above]);
+    }
+}
+
+/// All rows, two by two: compiled apart from what uses them.
+struct EliminatedRows<'a, S: Lanes> {
     simd: S,
     factor: &'a mut SharedFactor<S>,
     degrees: usize,
-    below: usize,
+    given: Given<'a, S>,
 }
 
-impl<S: Lanes> NullaryFnOnce for EliminatedColumns<'_, S> {
+impl<S: Lanes> NullaryFnOnce for EliminatedRows<'_, S> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        let Self { simd, factor, degrees, below } = self;
-        for column in 0..degrees.min(MOST) {
-            factor.column(simd, (degrees, below), column);
+        let Self { simd, factor, degrees, given } = self;
+        factor.pair::<true>(simd, degrees, 0, &given);
+        for k in (2..degrees).step_by(2) {
+            factor.pair::<false>(simd, degrees, k, &given);
         }
     }
 }
 
-/// Takes the columns before off a column of some rows of the matrix, and of two rows below it where they are given.
-#[inline(always)]
-fn eliminate_with<S: Lanes, const N: usize>(
-    simd: S,
-    rows: &mut [[S::f64s; MOST]; N],
-    pair: &mut [[S::f64s; MOST]],
-    factors: (&[S::f64s; MOST], usize),
-    sums: [&[S::f64s]; 2],
-) {
-    if let Some(pair) = pair.first_chunk_mut::<2>() {
-        eliminate(simd, rows, pair, factors, sums);
-    } else {
-        eliminate(simd, rows, &mut [], factors, sums);
-    }
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::irregular::shared_sums::{ChebyshevSums, at};
+    use crate::simd::instructions::Instructions;
+    use crate::simd::vectors::{Kernel, dispatch};
 
-/// Takes the columns before off a column of some rows of the matrix, and of some below it. That of the matrix is the sum of halves of moments,
-/// from the sum of row and column on and from their difference on.
-#[inline(always)]
-fn eliminate<S: Lanes, const N: usize, const BELOW: usize>(
-    simd: S,
-    rows: &mut [[S::f64s; MOST]; N],
-    below: &mut [[S::f64s; MOST]; BELOW],
-    (factors, column): (&[S::f64s; MOST], usize),
-    [plus, minus]: [&[S::f64s]; 2],
-) {
-    let column = column.min(MOST - 1);
-    let (mut sums, mut of_below) = ([factors[0]; N], [factors[0]; BELOW]);
-    let (plus, minus) = (&plus[..N], &minus[..N]);
-    for n in 0..N {
-        sums[n] = simd.add_f64s(plus[n], minus[n]);
+    /// Samples at uneven times, other ones in each lane.
+    const SAMPLES: usize = 40;
+
+    /// Compares what follows from moments with sums of the polynomials themselves over the samples.
+    struct OverSamples {
+        degrees: usize,
     }
-    for n in 0..BELOW {
-        of_below[n] = below[n][column];
-    }
-    for k in 0..column {
-        for n in 0..N {
-            sums[n] = simd.mul_add_f64s(rows[n][k], factors[k], sums[n]);
+
+    impl Kernel for OverSamples {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<S: Lanes>(self, simd: S) {
+            let Self { degrees } = self;
+            let zero = simd.splat_f64s(0.0);
+            let number = |place: usize, lane: usize| {
+                let turn = (place * 7 + lane * 3) as f64;
+                (-1.0 + 2.0 * place as f64 / (SAMPLES - 1) as f64 + 0.01 * turn.sin(), (0.3 * turn).cos())
+            };
+            let vectors = |place: usize| {
+                let (mut times, mut samples) = ([0.0; 8], [0.0; 8]);
+                for lane in 0..S::F64_LANES {
+                    (times[lane], samples[lane]) = number(place, lane);
+                }
+                [simd.load(&times, 0), simd.load(&samples, 0)]
+            };
+            let mut sums = ChebyshevSums::zero(simd);
+            for place in 0..SAMPLES {
+                let [time, sample] = vectors(place);
+                sums.add(simd, degrees, &[time], &[simd.splat_f64s(1.0)], &[sample]);
+            }
+            let mut off = [zero; MOST];
+            for (k, coefficient) in off.iter_mut().enumerate().take(degrees) {
+                *coefficient = simd.splat_f64s(1.0 / (k + 1) as f64);
+            }
+            let mut factor = SharedFactor::zero(simd);
+            factor.decompose(simd, degrees, &sums.moments.0, &sums.products.0, &off);
+            let best = factor.solve(simd, degrees);
+            // Sums of squares and products with the samples, with what is taken off, and with all lower ones.
+            let mut found = [[zero; MOST]; 3];
+            let mut across = zero;
+            let (mut values, mut shared) = ([[zero; MOST]], [[zero; MOST]]);
+            let value = |polynomials: &[S::f64s; MOST], coefficients: &[S::f64s; MOST]| {
+                let pairs = polynomials.iter().zip(coefficients).take(degrees);
+                pairs.fold(zero, |sum, (one, other)| simd.mul_add_f64s(*one, *other, sum))
+            };
+            for place in 0..SAMPLES {
+                let [time, sample] = vectors(place);
+                factor.at(simd, degrees, time, &mut values);
+                at(simd, degrees, time, &mut shared);
+                let left = simd.sub_f64s(sample, value(&shared[0], &best.0));
+                let taken = value(&shared[0], &off);
+                for (k, value) in values[0].iter().enumerate().take(degrees) {
+                    for (sum, other) in found.iter_mut().zip([*value, sample, taken]) {
+                        sum[k] = simd.mul_add_f64s(*value, other, sum[k]);
+                    }
+                }
+                let last = values[0][degrees - 1];
+                let lower = simd.sub_f64s(value(&values[0], &[simd.splat_f64s(1.0); MOST]), last);
+                let lower = simd.add_f64s(lower, left);
+                across = simd.mul_add_f64s(last, lower, across);
+            }
+            let assert_near = |one: S::f64s, other: S::f64s, what: &str| {
+                let (mut ones, mut others) = ([0.0; 8], [0.0; 8]);
+                simd.store(&mut ones, 0, one);
+                simd.store(&mut others, 0, other);
+                for lane in 0..S::F64_LANES {
+                    // Sums of 40 samples of up to one, and rounding that orders to 15 amplify by less than 1e3.
+                    let most = 1e3 * SAMPLES as f64 * f64::EPSILON;
+                    assert!((ones[lane] - others[lane]).abs() < most, "{what} of {degrees} in lane {lane}");
+                }
+            };
+            let [squares, of_samples, of_taken] = found;
+            let known = [&factor.own.0, &factor.turned.0, &factor.inverse.0].map(|column| column[..degrees].iter());
+            let [own, turned, inverse] = known;
+            for (square, inverse) in squares.iter().zip(inverse) {
+                assert_near(simd.mul_f64s(*square, *inverse), simd.splat_f64s(1.0), "sum of squares");
+            }
+            for (sum, own) in of_samples.iter().zip(own) {
+                assert_near(*sum, *own, "products with samples");
+            }
+            for (sum, turned) in of_taken.iter().zip(turned) {
+                assert_near(*sum, *turned, "products with what is taken off");
+            }
+            assert_near(across, zero, "orthogonality");
         }
-        for n in 0..BELOW {
-            of_below[n] = simd.mul_add_f64s(below[n][k], factors[k], of_below[n]);
+    }
+
+    #[test]
+    fn polynomials_from_moments_are_orthogonal_over_the_samples() {
+        for instructions in Instructions::available() {
+            for degrees in 1..=MOST {
+                dispatch(instructions, OverSamples { degrees });
+            }
         }
-    }
-    for n in 0..N {
-        rows[n][column] = sums[n];
-    }
-    for n in 0..BELOW {
-        below[n][column] = of_below[n];
     }
 }

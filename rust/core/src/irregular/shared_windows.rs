@@ -59,7 +59,6 @@ impl Kernel for WindowsAbreast<'_, '_> {
             tile: Tile::new(self.fields().good + 1, S::F64_LANES, S::F64_LANES),
             factor: SharedFactor::zero(simd),
             polynomials: OnLines([nothing.0; DERIVATIVES]),
-            off: nothing.clone(),
             coefficients: nothing.clone(),
             left: nothing,
         };
@@ -77,12 +76,11 @@ struct Workspace<S: Lanes> {
     /// What was found in the last few windows of each lane.
     tile: Tile,
     factor: SharedFactor<S>,
-    /// Shared polynomials and their derivatives at the samples that windows are for.
+    /// Polynomials and their derivatives at the samples that windows are for.
     polynomials: OnLines<[S::f64s; MOST], DERIVATIVES>,
-    /// In the orthogonal polynomials of each window: what was taken off the samples, and with it what the window adds to that.
-    off: OnLines<S::f64s, MOST>,
+    /// In the orthogonal polynomials of each window: what was taken off the samples, and what the window adds to that.
     coefficients: OnLines<S::f64s, MOST>,
-    /// What is to be added to what was taken off.
+    /// What is to be added to what was taken off, over each polynomial's sum of squares.
     left: OnLines<S::f64s, MOST>,
 }
 
@@ -199,36 +197,31 @@ impl WindowsAbreast<'_, '_> {
         window: &SlidSums<S>,
         work: &mut Workspace<S>,
     ) -> FoundAbreast<S> {
-        let Workspace { columns, factor, polynomials, off, coefficients, left, .. } = work;
+        let Workspace { columns, factor, polynomials, coefficients, left, .. } = work;
         let errors = !self.fits.errors.is_empty();
         let wanted = self.fit.derivatives + 1;
         let zero = simd.splat_f64s(0.0);
         let time = simd.sub_f64s(simd.load(&abreast.time, 0), simd.load(&abreast.middle, 0));
         let time = simd.mul_f64s(time, simd.load(&abreast.scale, 0));
-        at(simd, degrees, time, &mut polynomials.0[..wanted]);
-        let before = sums(simd, degrees, &polynomials.0[..wanted], &window.coefficients.0);
-        factor.below.0[0] = window.left.products.0;
-        if errors {
-            factor.below.0[2..2 + wanted].copy_from_slice(&polynomials.0[..wanted]);
-        }
-        factor.decompose(simd, degrees, &window.left.moments.0, if errors { 2 + wanted } else { 2 });
-        let own = &factor.below.0[0];
+        let polynomials = &mut polynomials.0[..wanted];
+        at(simd, degrees, time, polynomials);
+        let before = sums(simd, degrees, polynomials, &window.coefficients.0);
+        factor.decompose(simd, degrees, &window.left.moments.0, &window.left.products.0, &window.coefficients.0);
+        factor.at(simd, degrees, time, polynomials);
+        let (own, off) = (&factor.own.0, &factor.turned.0);
         let (mut residual, mut far, mut rounded) = (window.square, zero, zero);
         for (k, (&left, &inverse)) in own.iter().zip(&factor.inverse.0).enumerate().take(degrees) {
-            let end = factor.below.0[1][k];
+            let end = factor.grown.0[k];
             residual = simd.negate_mul_add_f64s(simd.mul_f64s(left, left), inverse, residual);
             far = simd.mul_add_f64s(simd.mul_f64s(end, end), inverse, far);
             rounded = simd.mul_add_f64s(window.tails.0[k], inverse, rounded);
         }
         let floor = self.floor(simd, abreast, columns, window);
         let good = is_good(simd, degrees, columns, [far, factor.weakest], [residual, floor, window.peak, rounded]);
-        // What each order leaves asks for the polynomial that was taken off, too.
         let is_fixed = matches!(self.fit.order, Order::Fixed(_));
-        if errors || !is_fixed {
-            factor.turned(simd, degrees, &window.coefficients.0, &mut off.0);
-            for (coefficient, (&off, &own)) in coefficients.0.iter_mut().zip(off.0.iter().zip(own)).take(degrees) {
-                *coefficient = simd.add_f64s(off, own);
-            }
+        // What each order leaves asks for the polynomial that was taken off, too.
+        for (coefficient, (&off, &own)) in coefficients.0.iter_mut().zip(off.iter().zip(own)).take(degrees) {
+            *coefficient = simd.add_f64s(off, own);
         }
         let residuals = OrderResiduals::new(simd, degrees, residual, &coefficients.0, &factor.inverse.0, floor);
         let choice = if is_fixed { residuals.fixed(simd, columns) } else { residuals.choose(simd, columns) };
@@ -236,11 +229,10 @@ impl WindowsAbreast<'_, '_> {
         if errors {
             let shares = if is_fixed { None } else { Some(residuals.shares(simd, columns)) };
             let chosen = (&residuals, &choice, shares.as_ref(), &*columns);
-            found.estimate_with_errors(simd, chosen, factor, &coefficients.0, &before[..wanted]);
+            found.estimate_with_errors(simd, chosen, factor, (&coefficients.0, polynomials), &before[..wanted]);
         } else {
-            choice.left(simd, degrees, own, &off.0, &mut left.0);
-            factor.solve(simd, degrees, left);
-            found.estimate(simd, degrees, &left.0, &polynomials.0, &before[..wanted]);
+            choice.left(simd, degrees, [own, off, &factor.inverse.0], &mut left.0);
+            found.estimate(simd, degrees, &left.0, polynomials, &before[..wanted]);
         }
         found
     }
@@ -357,13 +349,12 @@ impl<S: Lanes> FoundAbreast<S> {
             &TableColumns,
         ),
         factor: &SharedFactor<S>,
-        coefficients: &[S::f64s; MOST],
+        (coefficients, polynomials): (&[S::f64s; MOST], &[[S::f64s; MOST]]),
         before: &[S::f64s],
     ) {
         let degrees = residuals.degrees;
-        let own = &factor.below.0[0];
-        for (derivative, &before) in before.iter().enumerate() {
-            let row = &factor.below.0[2 + derivative];
+        let own = &factor.own.0;
+        for (derivative, (&before, row)) in before.iter().zip(polynomials).enumerate() {
             let mut full = before;
             for ((polynomial, inverse), own) in row.iter().zip(&factor.inverse.0).zip(own).take(degrees) {
                 full = simd.mul_add_f64s(simd.mul_f64s(*polynomial, *inverse), *own, full);
@@ -374,7 +365,7 @@ impl<S: Lanes> FoundAbreast<S> {
         }
     }
 
-    /// Estimates every derivative by one polynomial in the shared basis: what is left of the samples, and orders that were taken off too many.
+    /// Estimates every derivative by one polynomial: what is left of the samples, and orders that were taken off too many.
     #[inline(always)]
     fn estimate(
         &mut self,
