@@ -120,6 +120,9 @@ impl WindowSpan {
 
     /// The windows around every `step`-th sample, by their numbers.
     pub(crate) fn places(self, times: &[f64], windows: Range<usize>, step: usize) -> Vec<PlacedWindow> {
+        if let Self::Samples(_) = self {
+            return windows.map(|window| self.place(times, window * step, 0, 0)).collect();
+        }
         let mut places: Vec<PlacedWindow> = Vec::with_capacity(windows.len());
         for window in windows {
             let place = match places.last() {
