@@ -27,6 +27,9 @@ class LeavingSomething(Trial):
     def _feeds_energy(self, *_: object) -> bool:
         return False
 
+    def _is_late(self, *_: object) -> bool:
+        return True
+
     def _worth_it(self, *_: object) -> dict[Any, Any]:
         return {}
 
@@ -62,7 +65,7 @@ def tried(
 
     kinds = {"inertia": "constant", "damping": "varying", "stiffness": "windowed"}
     settings = {"kinds": kinds, "lag": 0.0, "window_length": 21, "exponent": 9}
-    result: Any = SimpleNamespace(settings=settings, time=np.arange(4000.0))
+    result: Any = SimpleNamespace(settings=settings, time=np.arange(4000.0), record_status=Status(0))
     trial = LeavingSomething(identify, result, AUTOMATIC, ["offset"], suspects, beyond_chance=beyond_chance)
     first, again = (list(trial._each_beside_changes()) for _ in range(2))  # noqa: SLF001 - what is tried is the test
     assert first == again

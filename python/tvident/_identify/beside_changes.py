@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from tvident._identify.left_over import AS_GOOD, Left
 from tvident._identify.offered import Remedy, are_distinguished, can_be, holds, is_there
 from tvident._identify.tried_record import BETTER, CONTRADICTED, LEFT_OVER, Call, Names, TriedRecord
 from tvident._results import Identification
+from tvident._status import Status
 
 _ENOUGH = 0.2
 """So much may be left by what nothing contradicts for no other suspect to be tried: each takes as long as to identify a part."""
@@ -24,6 +25,12 @@ _WINDOWS = 4
 
 _LEAST = 4
 """Windows that a first look has at least."""
+
+_NARROWER = (4, 2)
+"""Parts of the test function at hand that looks beside windows are taken with."""
+
+_SHORTEST = 9
+"""Samples that a test function has at least."""
 
 _FAR_SMALLER = 1 / 3
 """What predicts as much is advised where an error falls to this part or below."""
@@ -70,13 +77,18 @@ class BesideChanges(TriedRecord):
                 if not allowed.issuperset(names) or result.record_status & LEFT_OVER or not self._may_be(names, result):
                     continue
                 moved = self._moved(result)
-                if moved:
+                if moved or self._explains_noise(names, result):
                     change = self._change(names, result)
                     return (
                         names,
                         f"{self._suspicions(names, result)}: give {change}; then nothing else is suspected{moved}",
                     )
         return None
+
+    def _explains_noise(self, names: Names, result: Identification) -> bool:
+        """Return whether a term that a look sees beside windows explains what the noise does not, and nothing else is contradicted."""
+        is_explained = self.result.record_status & Status.NOISE_MODEL and not result.record_status & CONTRADICTED
+        return bool(is_explained) and names == tuple(self._seen_beside_changes)
 
     def _each_beside_changes(self) -> Iterator[dict[Names, Identification]]:
         """Yield what suspects make of the record: beside constants and stiffness as it was asked for, then as all was asked for.
@@ -135,7 +147,34 @@ class BesideChanges(TriedRecord):
         ]
         lag: list[Names] = [("lag",)] if "lag" in self._seen else []
         suspected: list[Names] = [(one,) for one in self.suspects if one in self.beyond_chance]
-        return list(dict.fromkeys([*lag, *suspected, *there]))
+        seen: list[Names] = [(one,) for one in self._seen_beside_changes]
+        return list(dict.fromkeys([*seen, *lag, *suspected, *there]))
+
+    @cached_property
+    def _seen_beside_changes(self) -> list[str]:
+        """What looks see where windows follow what changes: beside constants a weak friction is drowned in what a damping does that varies.
+
+        What is missing has made the test function at hand wide, as slow changes are told best by; kinks are told by narrow ones.
+        """
+        if not self.result.record_status & CONTRADICTED:
+            return []
+        sought = [one for one in self._sought if one != "lag"]
+        for part in _NARROWER:
+            look = FirstLook(
+                partial(self._left_in_windows, max(_SHORTEST, self.result.settings["window_length"] // part | 1))
+            )
+            if look.tells and (seen := look.seen(sought)):
+                return seen[:1]
+        return []
+
+    def _left_in_windows(self, length: int, names: Names) -> float:
+        """Return the mean square of what equations with these terms leave where windows follow all that changes."""
+        found = self.result.settings["kinds"]
+        given = {
+            name: "windowed" if isinstance(kind, str) and found[name] == "varying" else kind
+            for name, kind in self._beside_constants.items()
+        }
+        return self._left_with(given, names, self._lengths(length))
 
     @cached_property
     def _look(self) -> FirstLook:
@@ -143,8 +182,12 @@ class BesideChanges(TriedRecord):
 
     def _left_at_given_lengths(self, names: Names) -> float:
         """Return the mean square of what equations of given lengths leave with these terms, beside constants."""
-        call, kinds = self._with(self._of_constants_alone, *names), self._beside_constants
-        lengths = self._lengths_of_look
+        return self._left_with(
+            self._beside_constants, names, self._lengths(2 * self.result.settings["window_length"] + 1)
+        )
+
+    def _left_with(self, kinds: Mapping[str, Any], names: Names, lengths: dict[str, Any]) -> float:
+        call = self._with(self._of_constants_alone, *names)
         if not any(isinstance(kind, str) and kind == "windowed" for kind in kinds.values()):
             del lengths["regression_window"]
         terms = [(term, "constant") for term in call["terms"]]
@@ -157,13 +200,10 @@ class BesideChanges(TriedRecord):
         left = found.residual_std[np.isfinite(found.residual_std)]
         return float(np.mean(left**2)) if left.size else np.inf
 
-    @property
-    def _lengths_of_look(self) -> dict[str, Any]:
+    def _lengths(self, length: int) -> dict[str, Any]:
         """Lengths that follow little: those at hand may follow what is missing."""
-        settings = self.result.settings
-        length = 2 * settings["window_length"] + 1
         window = max(length, min(_WINDOWS * length, self.result.time.size // _LEAST))
-        return {"window_length": length, "exponent": settings["exponent"], "regression_window": window}
+        return {"window_length": length, "exponent": self.result.settings["exponent"], "regression_window": window}
 
     def _tried_until_settled(
         self, kinds: Mapping[str, Any], call: Call, suspects: Sequence[Names]
