@@ -153,3 +153,26 @@ def test_a_part_of_which_nothing_is_there_is_not_the_busiest(how: str) -> None:
     result = tvident.identify(angle, torque, sample_rate=500, mask=mask)
     assert any("try terms=['offset', 'coulomb']" in line for line in result.advice)
     assert result.summary().startswith("do not trust: another equation explains more")
+
+
+@pytest.mark.parametrize(
+    ("left", "error", "is_late"),
+    [(0.98, 0.01, True), (0.4, 0.01, False), (-0.1, 0.26, False), (0.4, 0.5, True), (0.0, None, True)],
+)
+def test_a_lag_most_of_which_is_gone_beside_friction_is_none(left: float, error: float | None, is_late: bool) -> None:
+    """One that is within chance of what it was, or is not determined beside friction, is not shown to be any."""
+    asked: list[dict[str, Any]] = []
+
+    def identify(**given: Any) -> Any:
+        asked.append(given)
+        return SimpleNamespace(settings={"lag": left} | ({} if error is None else {"lag_stderr": error}))
+
+    kinds = {"inertia": "constant", "damping": "varying", "stiffness": "windowed", "offset": "windowed"}
+    settings = {"kinds": kinds, "lag": 1.0, "window_length": 21, "exponent": 9, "regression_window": 84}
+    found: Any = SimpleNamespace(settings=settings)
+    trial = Trial(identify, found, AUTOMATIC, ["offset"], ["lag"])
+    assert trial._is_late(found) == is_late  # noqa: SLF001 - what is tried is the test
+    terms = [("offset", "windowed"), ("coulomb", "constant"), ("quadratic_drag", "constant")]
+    lengths = {name: settings[name] for name in ("window_length", "exponent", "regression_window")}
+    expected = {"inertia": "constant", "damping": "auto", "stiffness": "windowed"}
+    assert asked == [{**expected, "terms": terms, "lag": "auto", **lengths}]

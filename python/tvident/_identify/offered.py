@@ -88,9 +88,7 @@ def is_there(name: str, found: Identification) -> bool:
 
 
 def is_told(name: str, found: Identification) -> bool:
-    """Return whether a term that constants alone needed is more than its error beside what changes; a lag is that of the constants."""
-    if name == "lag":
-        return True
+    """Return whether a term that constants alone needed is more than its error beside what changes."""
     value, error, *_ = found.value(name)
     return bool(abs(value) > _TOLD * error)
 

@@ -94,12 +94,10 @@ class Trial(BesideChanges):
         best, of_best = (left, found) if is_simple else (left_free, free)
         if not (is_simple or chosen or is_none):
             return None
-        untold = [one for one in chosen if not is_told(one, of_best)]
+        untold = [one for one in chosen if not (self._is_late(found) if one == "lag" else is_told(one, of_best))]
         if untold:
-            # Beside what changes it may be nothing.
-            without, call = (
-                one | {"terms": [term for term in one["terms"] if term not in untold]} for one in (before, asked)
-            )
+            # Beside what changes it may be nothing, and so may a lag beside friction.
+            without, call = (self._without(one, untold) for one in (before, asked))
             return self._compared(without, call, [one for one in chosen if one not in untold])
         is_worth_it = best.least.share < 1 and best.ratio <= (BETTER if is_simple else self._worth)
         if not is_worth_it or self._feeds_energy(of_best) or not all(can_be(one, of_best) for one in chosen):
@@ -129,6 +127,11 @@ class Trial(BesideChanges):
         is_more = bool(chosen) and not is_none
         distinguishes = is_more and are_distinguished(flags if is_simple else free.record_status)
         return Remedy(best.ratio, said, distinguishes, is_settled=is_settled, share=best.least.share)
+
+    def _without(self, call: Call, names: Sequence[str]) -> Call:
+        """Return a call without some of what was chosen."""
+        lag = self.result.settings["lag"] if "lag" in names else call["lag"]
+        return call | {"terms": [term for term in call["terms"] if term not in names], "lag": lag}
 
     def _made_constant(self, changing: Sequence[str], kept: Mapping[str, Any], call: Call) -> list[str]:
         """Return what must be given as constant for the parameters that are told: what changes, and what changes once that may not.

@@ -34,6 +34,12 @@ CONTRADICTED = LEFT_OVER | Status.SCALES_DISAGREE | Status.KIND_CONTRADICTED
 _APART, _KNOWN, _MOSTLY = 4.0, 0.1, 0.9
 """A parameter stays what it is where it is so many errors away, these are at most such a part of it, and both at so many of the samples."""
 
+_MOST_OF_LAG = 0.5
+"""A lag stays what it is where so much of it is left beside what resists the motion."""
+
+_BY_CHANCE = 2.0
+"""Standard errors of what is left by which a lag may differ from what it was."""
+
 Call = dict[str, Any]
 
 Names = tuple[str, ...]
@@ -106,7 +112,33 @@ class TriedRecord:
 
     def _may_be(self, names: Names, found: Identification) -> bool:
         """Return whether suspects are beyond chance, can be what they are called, and leave a machine that can be."""
-        return all(is_there(one, found) for one in names) and not self._feeds_energy(found)
+        if not all(is_there(one, found) for one in names) or self._feeds_energy(found):
+            return False
+        return "lag" not in names or self._is_late(found)
+
+    def _is_late(self, found: Identification) -> bool:
+        """Return whether the lag of a result is about the same beside what resists the motion.
+
+        Friction that is smooth looks like one: most of such a lag is gone beside dry friction and drag, which hardly change a true one.
+        """
+        kinds = found.settings["kinds"]
+        resisting = [name for name, one in BUILT_IN.items() if one.dissipates and not one.inner and name not in kinds]
+        if not resisting:
+            return True
+        is_constant = {name: isinstance(kind, str) and kinds[name] == "constant" for name, kind in self.given.items()}
+        asked = {name: "constant" if is_constant[name] else kind for name, kind in self.given.items()}
+        own = {term.name: term for term in self.terms if not isinstance(term, str)}
+        terms = [(own.get(name, name), kind) for name, kind in kinds.items() if name not in COEFFICIENTS]
+        lengths = {name: found.settings[name] for name in ("window_length", "exponent")}
+        if "windowed" in kinds.values():
+            lengths["regression_window"] = found.settings["regression_window"]
+        try:
+            terms += [(name, "constant") for name in resisting]
+            beside = self.identify(**asked, terms=terms, lag="auto", **lengths)
+        except ValueError:
+            return True
+        late, left, error = found.settings["lag"], beside.settings["lag"], beside.settings.get("lag_stderr")
+        return error is None or bool(left / late >= _MOST_OF_LAG or abs(late - left) <= _BY_CHANCE * error)
 
     def _feeds_energy(self, found: Identification) -> bool:
         """Return whether a machine has a negative inertia or damping with another equation only."""
