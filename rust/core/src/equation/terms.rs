@@ -42,6 +42,13 @@ pub struct BuiltInTerm {
     pub(crate) beside_torque: bool,
 }
 
+impl BuiltInTerm {
+    /// Whether it is a function of the velocity.
+    pub(crate) fn is_of_velocity(&self) -> bool {
+        matches!(self.function, TermFunction::OfVelocity(_) | TermFunction::Direction)
+    }
+}
+
 /// Every built-in term. A new one is a row here and nothing else in the core.
 pub static BUILT_IN_TERMS: [BuiltInTerm; 7] = [
     BuiltInTerm { name: "offset", function: TermFunction::One, smooth: true, looked_for: true, beside_torque: true },

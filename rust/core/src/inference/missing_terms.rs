@@ -16,11 +16,15 @@ use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
 use crate::regression::model::Model;
 use crate::regression::problem::{Correlated, Problem};
+use crate::regression::residuals::residuals;
 use crate::regression::row_covariance::RowCovariance;
 use crate::simd::instructions::Instructions;
 
 /// A term is suspected if its coefficient exceeds its standard error so many times.
 pub const CONSPICUOUS: f64 = 5.0;
+
+/// Blocks of rows that must agree on a coefficient.
+const BLOCKS: usize = 32;
 
 /// A term that may be missing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,6 +118,31 @@ impl Suspect {
 /// Factors with their standard errors, and what constants change by.
 pub(crate) type FactorsAndChanges = (Vec<(f64, f64)>, Vec<f64>);
 
+/// What every row adds to a coefficient, over its right-hand side, and what is left of the row beside it.
+pub(crate) struct InRows {
+    by: Vec<f64>,
+    left: Vec<f64>,
+}
+
+impl InRows {
+    /// The standard error that follows from what blocks of rows leave, however that is distributed.
+    pub(crate) fn error_of_blocks(&self) -> f64 {
+        of_blocks(&self.by, &self.left, self.by.len().div_ceil(BLOCKS))
+    }
+
+    /// The root of the summed squares of the parts that blocks of so many rows have in a coefficient, whose column comes with it: one where a single one
+    /// tells it.
+    pub(crate) fn shares_of_blocks(&self, column: &[f64], rows: usize) -> f64 {
+        of_blocks(&self.by, column, rows)
+    }
+}
+
+/// The root of the summed squares of the products of two columns, block by block.
+fn of_blocks(one: &[f64], other: &[f64], rows: usize) -> f64 {
+    let products: Vec<f64> = one.iter().zip(other).map(|(one, other)| one * other).collect();
+    products.chunks(rows.max(1)).map(|block| block.iter().sum::<f64>().powi(2)).sum::<f64>().sqrt()
+}
+
 /// The fit that a term is added to.
 pub(crate) struct JudgedTerm<'a> {
     pub(crate) rows: &'a Rows,
@@ -143,6 +172,15 @@ impl JudgedTerm<'_> {
         stages: &mut Stages<'_, '_>,
     ) -> Result<Option<Vec<(f64, f64)>>, Error> {
         Ok(self.factors_and_changes(regressors, stages)?.map(|(factors, _)| factors))
+    }
+
+    /// What rows tell of the last of several regressors beside each other, or `None` if it is not determined.
+    pub(crate) fn in_rows(&self, regressors: &[usize], stages: &mut Stages<'_, '_>) -> Result<Option<InRows>, Error> {
+        let Some((problem, fit)) = self.beside(regressors, stages)? else { return Ok(None) };
+        let last = problem.layout.constant - 1;
+        let by = fit.moved_by_rows(&problem, last..last + 1, stages)?.swap_remove(0);
+        let (left, _) = residuals(&problem, &fit, stages)?;
+        Ok(Some(InRows { by, left }))
     }
 
     /// The problem with regressors as further constants, which are the last, and its fit, or `None` if there are none or they are not determined.
@@ -256,6 +294,30 @@ mod tests {
         assert_eq!((factors.len(), changes.len()), (2, constants + 1));
         // With every unit of the second the first goes back by half a unit, as far as 800 random rows tell.
         assert!((changes[constants] + 0.5).abs() < 4.0 / (ROWS as f64).sqrt(), "{changes:?}");
+    }
+
+    #[test]
+    fn blocks_that_do_not_agree_on_a_coefficient_have_a_larger_error() {
+        let block = ROWS / BLOCKS;
+        for apart in [0.0, 0.5] {
+            let mut rows = rows(ROWS, |_| [1.0, 0.0], DEVIATION);
+            let value = random(40, ROWS);
+            for (row, value) in value.iter().enumerate() {
+                rows.rhs[row] += if row / block % 2 == 0 { apart * value } else { -apart * value };
+            }
+            rows.regressors.push(column(value));
+            judged(&rows, DEVIATION * DEVIATION, |judged| {
+                let (_, of_noise) = staged(|stages| judged.factor(3, stages)).expect("determined");
+                let told = staged(|stages| judged.in_rows(&[3], stages)).expect("determined");
+                // Each block has the same share, and 32 tell their scatter to an eighth.
+                let expected = of_noise.hypot(apart / (BLOCKS as f64).sqrt());
+                assert!((told.error_of_blocks() / expected - 1.0).abs() < 0.5, "{} {expected}", told.error_of_blocks());
+                let shares = told.shares_of_blocks(&rows.regressors[3].value, block);
+                assert!((shares * (BLOCKS as f64).sqrt() - 1.0).abs() < 0.5, "{shares}");
+                let one = told.shares_of_blocks(&rows.regressors[3].value, ROWS);
+                assert!((one - 1.0).abs() < 1e-9, "{one}");
+            });
+        }
     }
 
     #[test]

@@ -132,6 +132,26 @@ impl Fit {
         covariance: &RowCovariance,
         stages: &mut Stages<'_, '_>,
     ) -> Result<Vec<f64>, Error> {
+        let moved = self.moved_by_rows(problem, some, stages)?;
+        let of = |moved: &Vec<f64>, stages: &mut Stages<'_, '_>| -> Result<f64, Error> {
+            let mut noisy = vec![0.0; moved.len()];
+            stages.fill([&mut noisy], |rows, parts| {
+                for part in parts {
+                    covariance.add_product(moved, rows.clone(), part);
+                }
+            })?;
+            Ok(moved.iter().zip(&noisy).map(|(a, b)| a * b).sum())
+        };
+        moved.iter().map(|moved| of(moved, stages)).collect()
+    }
+
+    /// What every row moves some of these constants by, times what is on its right-hand side.
+    pub(crate) fn moved_by_rows(
+        &self,
+        problem: &Problem<'_>,
+        some: Range<usize>,
+        stages: &mut Stages<'_, '_>,
+    ) -> Result<Vec<Vec<f64>>, Error> {
         let constants = problem.layout.constant;
         let mut moved = vec![Vec::new(); some.len()];
         // As many columns at a time as there are threads.
@@ -145,16 +165,7 @@ impl Fit {
                 }
             }
         }
-        let of = |moved: &Vec<f64>, stages: &mut Stages<'_, '_>| -> Result<f64, Error> {
-            let mut noisy = vec![0.0; moved.len()];
-            stages.fill([&mut noisy], |rows, parts| {
-                for part in parts {
-                    covariance.add_product(moved, rows.clone(), part);
-                }
-            })?;
-            Ok(moved.iter().zip(&noisy).map(|(a, b)| a * b).sum())
-        };
-        moved.iter().map(|moved| of(moved, stages)).collect()
+        Ok(moved)
     }
 
     /// The influence of every row on each of some constants.

@@ -8,6 +8,7 @@ use crate::equation::terms::BUILT_IN_TERMS;
 use crate::error::Error;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::lag::Followed;
+use crate::identify::weak::report::doubted::Doubted;
 use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::{CONSPICUOUS, JudgedTerm, Missing, Suspect};
@@ -123,6 +124,7 @@ impl Session<'_, '_, '_> {
             decided.model.correlated(&weak.rows, &errors.covariance, &mut self.stages)?
         };
         let (mut with_lag, mut changes, unknowns) = (Vec::new(), Changes::default(), self.unknowns());
+        let (resisting, reach) = (of_velocity(&candidates, &followed, first), weak.reach());
         for (place, missing) in candidates.iter().enumerate().filter(|(_, missing)| !missing.is_of_torque()) {
             let is_lag = *missing == Missing::Lag;
             let Some(follows) = &followed[place] else { continue };
@@ -159,6 +161,12 @@ impl Session<'_, '_, '_> {
                 with_lag = each.filter(|(one, _)| unknowns.contains(one)).collect();
             }
             changes.add(suspect, by_one.into_iter().map(|one| value * one).collect());
+            let doubted = Doubted { suspect, regressors: &regressors, unit, reach };
+            let suspect = match suspect.is_conspicuous() {
+                true if is_lag => self.agreed_lag(&judged, doubted, &resisting)?,
+                true => self.agreed(&judged, doubted)?,
+                false => suspect,
+            };
             // A term that is next to nothing of the torque, or has next to nothing left to explain, need not be there; a lag is little of it, and much of
             // the damping.
             let share = value * value * weak.rows.mean_square_of(place);
@@ -280,6 +288,17 @@ impl Session<'_, '_, '_> {
         all.sort_by_key(Missing::is_beside_torque);
         all
     }
+}
+
+/// The regressors of terms of the velocity, and of what follows them.
+fn of_velocity(candidates: &[Missing], followed: &[Option<Follows>], first: usize) -> Vec<usize> {
+    let is_of_velocity = |one: &Missing| matches!(one, Missing::Term(term) if term.is_of_velocity());
+    let each = candidates.iter().zip(followed).enumerate().filter(|(_, (one, _))| is_of_velocity(one));
+    let regressors = |(place, (_, follows)): (usize, (&Missing, &Option<Follows>))| {
+        let by = follows.as_ref().map(|follows| follows.regressor.into_iter().chain([first + place]));
+        by.into_iter().flatten().collect::<Vec<_>>()
+    };
+    each.flat_map(regressors).collect()
 }
 
 /// The rows of a long record that what may be missing is judged by.

@@ -2,6 +2,7 @@
 
 pub(crate) mod at_rows;
 pub(crate) mod beside_lag;
+pub(crate) mod doubted;
 pub(crate) mod errors;
 pub(crate) mod explained;
 pub(crate) mod filter;
