@@ -17,6 +17,11 @@ pub(crate) struct BesideLag {
     pub(crate) untold: Option<Vec<f64>>,
 }
 
+/// Samples of a lag that are not told, up to where its rate is no line any more.
+pub(crate) fn untold_lag(decided: &Decided, weak: &WeakRows) -> f64 {
+    decided.untold_lag.min(UNKNOWN * weak.function.half_width() as f64)
+}
+
 impl Session<'_, '_, '_> {
     /// The covariance of the constants from the noise, beside a lag if one was sought.
     pub(crate) fn covariance_of(
@@ -73,9 +78,7 @@ impl Session<'_, '_, '_> {
         };
         let covariance = (0..wanted * wanted).map(|place| entry(place / wanted, place % wanted)).collect();
         let with_rate = &all.pooled.inverse[wanted * count..];
-        // Beyond it the rate is no line.
-        let most = UNKNOWN * weak.function.half_width() as f64;
-        let seconds = decided.untold_lag.min(most) * self.options.delta;
+        let seconds = untold_lag(decided, weak) * self.options.delta;
         let change = |one: usize| seconds * (with_rate[one] / with_rate[wanted] - follows(one));
         let changes: Vec<f64> = (0..wanted).map(change).collect();
         let untold = Some(changes).filter(|all| seconds > 0.0 && all.iter().all(|one| one.is_finite()));

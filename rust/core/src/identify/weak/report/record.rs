@@ -10,10 +10,10 @@ use crate::identify::scanned::Scan;
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::found::WeakIdentified;
-use crate::identify::weak::lag::{Lag, UNKNOWN};
+use crate::identify::weak::lag::Lag;
 use crate::identify::weak::outside_mask::Inside;
 use crate::identify::weak::report::at_rows::{Fitted, OfAllRows};
-use crate::identify::weak::report::beside_lag::BesideLag;
+use crate::identify::weak::report::beside_lag::{BesideLag, untold_lag};
 use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::report::explained::Explained;
 use crate::identify::weak::report::filter::{LEAST_CHANGE, LeftOfFilter};
@@ -178,7 +178,7 @@ impl Session<'_, '_, '_> {
             with_lag: Vec::new(),
             suspects: Vec::new(),
             lag: None,
-            untold_lag: decided.untold_lag.min(UNKNOWN * weak.function.half_width() as f64),
+            untold_lag: untold_lag(decided, weak),
             filtered: None,
             angle_zero: None,
             free_offset: self.free_offset,
