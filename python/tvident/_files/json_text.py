@@ -150,14 +150,19 @@ def _of_even_samples(rows: Sequence[Any]) -> Channels | None:
         return None
     channels: Channels = {}
     for name in names:
-        cells = [one[name] for one in rows]
-        if not set(map(type, cells)) <= _NUMBERS:
+        samples = _of_numbers([one[name] for one in rows])
+        if samples is None:
             return None
-        try:
-            channels[name] = np.array(cells, np.float64)
-        except OverflowError:
-            return None
+        channels[name] = samples
     return channels
+
+
+def _of_numbers(cells: Sequence[Any]) -> Numbers | None:
+    """Return samples that are all numbers; None where one is anything else, or too large for a sample."""
+    if set(map(type, cells)) <= _NUMBERS:
+        with suppress(OverflowError):
+            return np.array(cells, np.float64)
+    return None
 
 
 def _members(prefix: str, value: Any, depth: int) -> Iterable[tuple[str, Any]]:
@@ -174,9 +179,10 @@ def _members(prefix: str, value: Any, depth: int) -> Iterable[tuple[str, Any]]:
 
 def _column(name: str, cells: Mapping[int, Any], places: Sequence[int], say: Say) -> tuple[str, Numbers] | None:
     """Return the name and the samples of a column; None where it holds words, which is said."""
-    if len(cells) == len(places) and set(map(type, cells.values())) <= _NUMBERS:
-        with suppress(OverflowError):  # said below
-            return name, np.array([cells[row] for row in range(len(places))], np.float64)
+    if len(cells) == len(places):
+        samples = _of_numbers([cells[row] for row in range(len(places))])
+        if samples is not None:
+            return name, samples
     found = np.full(len(places), np.nan)
     words = {row: cell.strip() for row, cell in cells.items() if isinstance(cell, str)}
     values = {row: number(cell, comma=False) for row, cell in words.items()}
