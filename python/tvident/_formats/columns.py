@@ -68,9 +68,8 @@ def rate_in(whole: Mapping[str, Any], parts: Sequence[Mapping[str, Any]], skippe
 
     None where there are none, where they differ, or where one is no number; both is said.
     """
-    said = [one for one in map(_rate, [whole]) if one is not None] or [
-        one for one in map(_rate, parts) if one is not None
-    ]
+    of_whole, of_parts = ([one for one in map(_rate, some) if one is not None] for some in ([whole], parts))
+    said = of_whole or of_parts
     rates = dict.fromkeys(one if isinstance(one, float) else None for one in said)
     if None in rates:
         words = next(one for one in said if not isinstance(one, float))
