@@ -31,7 +31,8 @@ def called_as(example: str) -> Callable[[_Called], _Called]:
 
 
 def _answering(function: _Called, name: str, example: str) -> _Called:
-    parameters = [one for one in signature(function).parameters.values() if one.name != "self"]
+    declared = signature(function).parameters
+    parameters = [one for one in declared.values() if one.name != "self"]
     by_place = [one.name for one in parameters if one.kind in {one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD}]
     needed = [
         one.name
@@ -40,7 +41,7 @@ def _answering(function: _Called, name: str, example: str) -> _Called:
     ]
     # What has no place is given by name alone.
     places = {one: by_place.index(one) if one in by_place else len(by_place) for one in needed}
-    of_class = int("self" in signature(function).parameters)
+    of_class = int("self" in declared)
 
     @wraps(function)
     def call(*args: Any, **options: Any) -> Any:
