@@ -247,3 +247,25 @@ def test_clocks_of_one_name_that_differ_are_two(tmp_path: Path, late: float, rat
         ValueError, match=r"has several: t1, t2; give the clocks of angle and torque, such as t=\(recording\['t1'\]"
     ):
         _ = found.sample_rate
+
+
+@pytest.mark.parametrize(
+    ("head", "names"),
+    [
+        ("path;angle;torque;\nunit;deg;Nmm;\ntime;;;\n", ["time", "angle [deg]", "torque [Nmm]"]),
+        ("path;angle;torque;\nunit;deg;Nmm;\ntime [ms];;;\n", ["time [ms]", "angle [deg]", "torque [Nmm]"]),
+        ("time;;;\n;angle;torque;\n", ["time", "angle", "torque"]),
+        ("Measurement 1;;\nTime;;\n;angle [deg];torque [Nmm];\n", ["Time", "angle [deg]", "torque [Nmm]"]),
+        ("time;;;\ntime;angle;torque;\n", ["time", "angle", "torque"]),
+    ],
+)
+def test_times_that_are_named_in_a_line_of_their_own_keep_their_name(
+    tmp_path: Path, head: str, names: list[str]
+) -> None:
+    """They were called `path` or `0`, and no channel told the times."""
+    path = written(tmp_path, head + "".join(f"{place / 1000:.3f};{place};{-place}.5;\n" for place in range(50)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = recordings.read(path)
+    assert list(found) == names
+    np.testing.assert_array_equal(found[names[0]], np.arange(50) / 1000)
