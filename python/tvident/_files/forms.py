@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tvident._files import acqknowledge
+from tvident._files import acqknowledge, vicon
 from tvident._files.channels import Channels, Say
 from tvident._files.named_cells import form_of, read_named_cells
 from tvident._files.oscilloscopes import START, read_scope
@@ -18,5 +18,7 @@ def read_any_text(path: Path, say: Say) -> Channels:
         return read_scope(read_whole(path), read_columns, say)
     if acqknowledge.START.match(start):
         return acqknowledge.read_acqknowledge(read_whole(path), read_columns, say)
+    if vicon.START.match(start):
+        return vicon.read_vicon(read_whole(path), read_columns, say)
     form = form_of(start)
     return read_text(path, say) if form is None else read_named_cells(read_whole(path), form, say)
