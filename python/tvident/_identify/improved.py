@@ -12,6 +12,7 @@ import numpy as np
 from tvident import _core
 from tvident._advice import NOT_DISTINGUISHED, Explained
 from tvident._arguments import percent
+from tvident._clocks import bridged
 from tvident._equation import BUILT_IN, COEFFICIENTS, FRICTION, OFFSET, Unknown
 from tvident._identify.data import Data, cut
 from tvident._identify.free_offset import without_worse_offset
@@ -20,6 +21,7 @@ from tvident._identify.methods import StrongForm, WeakForm
 from tvident._identify.offered import BEYOND_CHANCE, NEXT_TO_NOTHING, contradicted
 from tvident._identify.remedies import Trial
 from tvident._identify.settings import Request, resolve
+from tvident._identify.signals import with_own_step
 from tvident._identify.tried_record import CONTRADICTED
 from tvident._identify.used import as_used
 from tvident._results import MARKED, TRIED, Identification, Words
@@ -207,8 +209,21 @@ class TriedInWeakForm(_AskedOfRecord):
             for name, kind in self.given.items()
         }
         asked = {**kinds, "terms": self.asked_terms, "lag": self.request.lag}
-        request = resolve(WeakForm(), asked, None, 1 / data.period)
-        return self.run(replace(request, period=self.request.period), data.stretch(some), diagnose=True)
+        request = replace(resolve(WeakForm(), asked, None, 1 / data.period), period=self.request.period)
+        part = data.stretch(some)
+        over_gaps = bridged({"angle": part.angles, "torque": part.torques}, None, part.workers)
+        if over_gaps is not None:
+            # Polynomials do without what is missing, rows of the weak form are gone with it.
+            request = with_own_step(request, {"angle": part.angles})
+            channels, passed = over_gaps.channels, over_gaps.passed
+            part = replace(
+                part,
+                angles=channels["angle"],
+                torques=channels["torque"],
+                clock=over_gaps.after(part.clock),
+                passed=(passed.get("angle"), passed.get("torque")),
+            )
+        return self.run(request, part, diagnose=True)
 
 
 def _busiest(data: Data, length: int) -> slice:
