@@ -27,6 +27,7 @@ from tvident._merged import (
     parts_of_result,
     that_lacks,
 )
+from tvident._results import unflagged
 from tvident._status import Status
 
 _NO_WORSE = 2.0
@@ -91,7 +92,7 @@ class _ChainTried:
         structure, parts = self.masses[0].structure, parts_of_result(self.found)
         if not isinstance(structure, Chain) or len(parts) != 1 or parts[0].equations.expansions:
             return False
-        is_named = bool(parts[0].found.terms) and not self.found.trusted.any()
+        is_named = bool(parts[0].found.terms) and not unflagged(self.found).any()
         if is_named or self.found.record_status & Status.RANK_DEFICIENT:
             return False
         driven = {mass for one in self.masses for mass in one.driven}

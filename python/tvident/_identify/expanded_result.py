@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from tvident._equation import COEFFICIENTS
 from tvident._identify.expanded_inputs import ExpandedInputs
-from tvident._results import Estimates, ExpandedFit, WindowsBeside
+from tvident._results import Estimates, ExpandedFit, WindowsBeside, unflagged
 from tvident._status import Status
 
 Array = npt.NDArray[np.float64]
@@ -97,7 +97,7 @@ class ExpandedOutcome:
         return WindowsBeside(
             getattr(pilot, name) if name in COEFFICIENTS else pilot.terms[name],
             pilot.stderr[name],
-            pilot.trusted,
+            unflagged(pilot),
             int(pilot.settings["regression_window"]) + length,
             length // 2,
             # The first sample after each.

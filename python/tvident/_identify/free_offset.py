@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from tvident._advice import FREE_OFFSET
-from tvident._results import Identification, Words
+from tvident._results import Identification, Words, unflagged
 
 _MOST_LOST = 0.1
 """The part of the trusted samples that a better prediction may cost."""
@@ -33,5 +33,5 @@ def without_worse_offset(words: Words, result: Identification, again: Callable[[
     except ValueError:
         # What is there of the record does not determine it.
         return replace(words, advice=rest)
-    is_worse = found.trusted.mean() < (1 - _MOST_LOST) * result.trusted.mean()
+    is_worse = unflagged(found).mean() < (1 - _MOST_LOST) * unflagged(result).mean()
     return replace(words, advice=rest) if is_worse else words

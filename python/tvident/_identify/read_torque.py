@@ -9,7 +9,7 @@ import numpy as np
 
 from tvident._clocks import unheld
 from tvident._identify.data import Data
-from tvident._results import Identification
+from tvident._results import Identification, unflagged
 from tvident._status import Status
 
 _AS_TRUSTED, _LEAST = 0.9, 0.5
@@ -44,6 +44,6 @@ def with_read_torque(data: Data, identified: Callable[[Data], Identification]) -
         doubts=[*data.doubts, *((0, doubt) for doubt in read.doubts)],
     )
     between = identified(other)
-    least = max(_AS_TRUSTED * float(np.mean(in_steps.trusted)), _LEAST)
-    is_worse = float(np.mean(between.trusted)) < least
+    least = max(_AS_TRUSTED * float(np.mean(unflagged(in_steps))), _LEAST)
+    is_worse = float(np.mean(unflagged(between))) < least
     return data if is_worse or between.record_status & Status.LAG_SUSPECTED else other

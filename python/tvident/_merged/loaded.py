@@ -120,6 +120,7 @@ def _restored(arrays: Mapping[str, Any], facts: Mapping[str, Any]) -> MergedIden
         if "held_back" in facts
         else {}
     )
+    compared |= {"_distrusted": facts["distrusted"]} if "distrusted" in facts else {}
     return MergedIdentification.of_known(
         merging,
         {

@@ -19,10 +19,10 @@ from tvident._merged.merging import Identifiable, Merging
 from tvident._merged.predicted import predicted
 from tvident._merged.simulated import MergedSimulated
 from tvident._merged.stored import store
-from tvident._merged.verdict import explained, verdict_of
+from tvident._merged.verdict import distrusted, explained, verdict_of
 from tvident._merged.words import summary_of, words_of
 from tvident._results import Measured, Scan, Telling, Words, every_sample, known_name, number_of
-from tvident._status import Status
+from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
 from tvident._tables import Table, Tabular
 
 if TYPE_CHECKING:
@@ -63,8 +63,35 @@ class Reported(MergedSimulated, Telling, Tabular):
 
     @property
     def trusted(self) -> npt.NDArray[np.bool_]:
-        """Where values can be trusted, shape (n,)."""
-        raise NotImplementedError
+        """Where values can be trusted, shape (n,): all that can be known are numbers, and neither a flag nor the verdict forbids it.
+
+        See Also
+        --------
+        status, record_status : the flags that it combines.
+        summary : begins with the verdict.
+        identifiable : what can be known at all.
+
+        References
+        ----------
+        docs/statuses.md.
+        """
+        return self._unflagged & (self._distrusted is None)
+
+    @property
+    def _unflagged(self) -> npt.NDArray[np.bool_]:
+        """Where all that can be known are numbers, and flags do not forbid to trust them."""
+        good = (self.status & DOUBTFUL == 0) & (int(self.record_status) & int(DOUBTFUL_RECORD) == 0)
+        found = [name for name, kind in self.kinds.items() if kind not in {"known", "unknown"}]
+        good &= bool(found)
+        for name, values in self.elements.items():
+            if self.identifiable[name]:
+                good &= np.isfinite(values)
+        return np.asarray(good)
+
+    @cached_property
+    def _distrusted(self) -> str | None:
+        """Why no sample is to be trusted; a part of a record is what the whole is."""
+        return distrusted(self, self._merging)
 
     def scan(self, part: int = 0) -> Scan:
         """Return estimates by the width of the test function, which tell whether equations of every scale agree.
@@ -193,7 +220,7 @@ class Reported(MergedSimulated, Telling, Tabular):
         Errors are explained in docs/automatic.md, "Errors".
         """
         values = self.elements[known_name(name, self.elements)]
-        return number_of(values, self.stderr[name], self.kinds[name], self.units.get(name, ""), self.trusted)
+        return number_of(values, self.stderr[name], self.kinds[name], self.units.get(name, ""), self._unflagged)
 
     def held_back(self) -> HeldBackTorque:
         """Return how much of the torques the equations explain in parts that they are not fitted to: the last tenth of every tenth.

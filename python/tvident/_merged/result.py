@@ -24,7 +24,7 @@ from tvident._merged.short import as_html, in_one_line
 from tvident._merged.verdict import wrong_inertia
 from tvident._merged.words import whose
 from tvident._results import ExpandedParameter, samples_between, scan_of
-from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
+from tvident._status import Status
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -246,13 +246,14 @@ class MergedIdentification(Oscillating, Reported):
                 "jumps": tuple(jump for jump in self.jumps if first <= jump <= last),
                 "_covariances": {pair: values[samples] for pair, values in self._covariances.items()},
                 "_held_back": HeldBackTorque(why_not="this is a part of a result; ask the whole"),
+                "_distrusted": self._distrusted,
             },
         )
 
     def __getstate__(self) -> dict[str, Any]:
         # A record may be long, and functions cannot be stored; what was found of it stays.
         sampling = self._merging.sampling.of_result
-        compared = {"_held_back": self._held_back, "_share": self._share}
+        compared = {"_held_back": self._held_back, "_share": self._share, "_distrusted": self._distrusted}
         known = {"_covariances": self._covariances, "_told": self._told, **compared}
         return {
             **self.__dict__,
@@ -384,27 +385,6 @@ class MergedIdentification(Oscillating, Reported):
                 rows, columns = np.nonzero(both.any(axis=2))
                 variance[rows, columns] += both[rows, columns] * values
         return np.sqrt(np.maximum(variance, 0))
-
-    @property
-    def trusted(self) -> npt.NDArray[np.bool_]:
-        """Where values can be trusted, shape (n,): all that can be known are numbers, and no flag forbids it.
-
-        See Also
-        --------
-        status, record_status : the flags that it combines.
-        identifiable : what can be known at all.
-
-        References
-        ----------
-        docs/statuses.md.
-        """
-        trusted = (self.status & DOUBTFUL == 0) & (int(self.record_status) & int(DOUBTFUL_RECORD) == 0)
-        found = [name for name, kind in self.kinds.items() if kind not in {"known", "unknown"}]
-        trusted &= bool(found)
-        for name, values in self.elements.items():
-            if self.identifiable[name]:
-                trusted &= np.isfinite(values)
-        return np.asarray(trusted)
 
     def _settings(self) -> dict[str, Any]:
         """Return what was chosen, as plain JSON."""

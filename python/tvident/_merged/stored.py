@@ -57,6 +57,7 @@ def store(path: Path, result: Any) -> None:
         "record_status": int(result.record_status),
         "held_back": {name: np.asarray(one).tolist() for name, one in asdict(result.held_back()).items()},
         "explained": result._share,  # noqa: SLF001 - of this room
+        "distrusted": result._distrusted,  # noqa: SLF001 - likewise
         "words": plain_words(result._told),  # noqa: SLF001 - of this room
         "scans": [plain_scan(scan) for scan in result.scans],
         "between": between,

@@ -12,10 +12,12 @@ from tvident._results import (
     CHANGING,
     found_marked,
     known_to,
+    mostly_flagged,
     negative,
     relative_error,
     share_of,
     two_digits,
+    unflagged,
     verdict_of_distrusted,
     verdict_of_trusted,
     why_not,
@@ -37,7 +39,7 @@ def verdict_of(result: Any, merging: Merging) -> str:
     if len(lost) == len(asked):
         return verdict_of_distrusted(result, "nothing can be known of what was asked")
     share: float | None = result._share  # noqa: SLF001 - of this room
-    reason = found_marked(result.advice) or why_not(result, lambda: _sign(result, merging), lambda: share)
+    reason = result._distrusted or mostly_flagged(result)  # noqa: SLF001 - likewise
     if reason:
         return verdict_of_distrusted(result, reason)
     known = _known(result, merging)
@@ -48,6 +50,13 @@ def verdict_of(result: Any, merging: Merging) -> str:
     return verdict_of_trusted(result, known, share)
 
 
+def distrusted(result: Any, merging: Merging) -> str | None:
+    """Return why no sample is to be trusted, in words; None where nothing says so."""
+    if not result.status.size:
+        return None
+    return found_marked(result.advice) or why_not(result, lambda: _sign(result, merging), lambda: result._share)  # noqa: SLF001 - of this room
+
+
 def _known(result: Any, merging: Merging) -> str:
     """Return how well elements are known; terms beside the equation are left to the table."""
     of_masses = merging.masses > 0
@@ -56,7 +65,7 @@ def _known(result: Any, merging: Merging) -> str:
         # Factors of a mechanism have names of their own, a term of a mass is called after both.
         if one.is_known or not (one.of in COEFFICIENTS or (of_masses and one.of == one.name)):
             continue
-        relative = relative_error(result.elements[one.name], result.stderr[one.name], result.trusted)
+        relative = relative_error(result.elements[one.name], result.stderr[one.name], unflagged(result))
         if of_masses and relative is not None and relative >= 1:
             # Most entries of full matrices are zero.
             lost.append(one.name)

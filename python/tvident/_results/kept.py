@@ -16,7 +16,8 @@ def plain_comparison(result: Any) -> dict[str, Any]:
     """Return how much of a recording a result explains, as JSON has it."""
     held_back = {name: _plain(value) for name, value in asdict(result.held_back()).items()}
     each = [None if one is None else [one.share, one.is_rest_noise] for one in comparisons(result)]
-    return {"held_back": held_back, "explained": each}
+    # A part of a record is what the whole is, which is not there later.
+    return {"held_back": held_back, "explained": each, "distrusted": list(result._distrusted)}  # noqa: SLF001 - of this room
 
 
 def comparisons(result: Any) -> list[ExplainedTorque | None]:
@@ -46,6 +47,11 @@ def explained_from(plain: Mapping[str, Any] | None) -> Sequence[ExplainedTorque 
     if plain is None:
         return None
     return [None if one is None else ExplainedTorque(one[0], one[1]) for one in plain["explained"]]
+
+
+def distrusted_from(plain: Mapping[str, Any] | None) -> tuple[str | None, ...] | None:
+    """Return why a file says that no sample of each record is to be trusted; None where it was written before it did."""
+    return None if plain is None or "distrusted" not in plain else tuple(plain["distrusted"])
 
 
 def _plain(value: Any) -> Any:

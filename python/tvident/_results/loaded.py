@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tvident._results.kept import explained_from, held_back_from
+from tvident._results.kept import distrusted_from, explained_from, held_back_from
 from tvident._results.records import IdentifiedRecords, Shared
 from tvident._results.result import Identification
 from tvident._results.stored import restored, words_from
@@ -37,6 +37,9 @@ def from_file(place: str, arrays: dict[str, npt.NDArray[Any]], facts: Mapping[st
     # Files of before have none.
     result._held_back = held_back_from(facts.get("compared"))  # noqa: SLF001 - of this room
     result._explained_each = explained_from(facts.get("compared"))  # noqa: SLF001 - likewise
+    reasons = distrusted_from(facts.get("compared"))
+    if reasons is not None:
+        result._distrusted = reasons  # noqa: SLF001 - likewise
     return result
 
 

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tvident._results.verdict import unflagged
+
 Array = npt.NDArray[np.float64]
 
 _LOOKED_AT = 1 << 12
@@ -41,7 +43,8 @@ def median_of(result: Any, name: str) -> tuple[float, float]:
         return one.value, one.stderr
     values, errors = getattr(result, name), result.stderr[name]
     there = np.isfinite(values) & (errors > 0) & np.isfinite(errors)
-    some = there & result.trusted if (there & result.trusted).any() else there
+    good = there & unflagged(result)
+    some = good if good.any() else there
     window = length / result.settings["step"]
     return one.value, error_of_median(values, np.where(some, errors, np.nan), in_common, window)
 

@@ -30,7 +30,7 @@ from tvident._results.recorded import Recorded
 from tvident._results.scan import Scan
 from tvident._results.shown import Shown
 from tvident._results.standard_errors import StandardErrors
-from tvident._results.verdict import ExplainedTorque
+from tvident._results.verdict import ExplainedTorque, distrusted
 from tvident._results.words import Words, of_batch
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD
 
@@ -121,6 +121,10 @@ class Identification(Shown):
         super().__init__(recorded)
         self._explained_each: Sequence[ExplainedTorque | None] | None = None
         """How much of the torque of every record is explained, of a result whose recording is not there."""
+        self._share: tuple[float | None] | None = None
+        """How much of the torque of the only record is explained, once that was asked."""
+        self._whole: Identification | None = None
+        """The result that this one is a part of."""
         self.expansions: dict[str, ExpandedParameter] = dict(found.expansions)
         self.units = found.units
         self.time = time
@@ -155,17 +159,29 @@ class Identification(Shown):
         r"""Where values can be trusted, shape (\*, n): the mask for plotting and averaging.
 
         True where every parameter is a finite number, where the sample's status has none of INVALID, RANK_DEFICIENT, ILL_CONDITIONED and
-        NOISE_MODEL, and where that of the record has none of RANK_DEFICIENT, ILL_CONDITIONED and SCALES_DISAGREE.
+        NOISE_MODEL, and where that of the record has none of RANK_DEFICIENT, ILL_CONDITIONED and SCALES_DISAGREE; nowhere in a record
+        whose summary begins with "do not trust" for another reason than that most samples are flagged: a sign that no machine has, too
+        little of the torque explained, numbers that may mark missing values, another equation or form that finds other parameters. Of a
+        batch its first hundred records are judged so. Asking for the first time takes as long as the summary.
 
         See Also
         --------
         status, record_status : the flags that it combines.
-        value : takes what is trusted only.
+        summary : begins with the verdict.
 
         References
         ----------
         docs/statuses.md, which is tested against this rule.
         """
+        trusted = self._unflagged
+        for place, reason in enumerate(self._distrusted):
+            if reason is not None:
+                trusted.reshape(-1, trusted.shape[-1])[place] = False
+        return trusted
+
+    @property
+    def _unflagged(self) -> npt.NDArray[np.bool_]:
+        """Where there are numbers, and flags do not forbid to trust them."""
         records = np.asarray(self.record_status)[..., np.newaxis]
         # NumPy takes a flag for a number of 64 bits.
         trusted = (self.status & np.uint16(DOUBTFUL) == 0) & (records & DOUBTFUL_RECORD == 0)
@@ -203,6 +219,12 @@ class Identification(Shown):
         """
         return self._oscillator.damping_ratio
 
+    @cached_property
+    def _distrusted(self) -> tuple[str | None, ...]:
+        """Why no sample of each record is to be trusted; a part of a record is what the whole is."""
+        whole = self._whole
+        return distrusted(self) if whole is None else whole._distrusted  # noqa: SLF001 - of this class
+
     def __getstate__(self) -> dict[str, Any]:
         """Return what a pickle keeps: words, and of a single record all that its summary says, without the recording.
 
@@ -213,7 +235,7 @@ class Identification(Shown):
         if self.inertia.ndim == 1:
             self.held_back()
         # What finds the words knows the record.
-        return super().__getstate__() | {"_words": self._told}
+        return super().__getstate__() | {"_words": self._told, "_distrusted": self._distrusted, "_whole": None}
 
     def __copy__(self) -> Identification:
         copied = object.__new__(type(self))
@@ -323,6 +345,7 @@ class Identification(Shown):
             settings=self.settings,
         )
         part._held_back = HeldBack(why_not="this is a part of a result; ask the whole")
+        part._whole = self
         return part
 
     def __iter__(self) -> Iterator[Identification]:

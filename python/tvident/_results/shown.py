@@ -84,14 +84,23 @@ class Shown(Simulated, Telling, Valued):
             )
         return {"time": self.time, **self._table().columns}
 
-    def _table(self) -> Table:
-        columns: dict[str, npt.NDArray[Any]] = {}
+    @property
+    def trusted(self) -> npt.NDArray[np.bool_]:
+        r"""Where values can be trusted, shape (\*, n)."""
+        raise NotImplementedError
+
+    def _numbers(self) -> dict[str, npt.NDArray[np.float64]]:
+        columns: dict[str, npt.NDArray[np.float64]] = {}
         values = {"inertia": self.inertia, "damping": self.damping, "stiffness": self.stiffness, **self.terms}
         values |= {name: self._found.values[name] for name in self.settings["inner"]}
         values |= {"natural_frequency": self.natural_frequency, "damping_ratio": self.damping_ratio}
         for name, value in values.items():
             columns[name] = value
             columns[f"{name}_stderr"] = self.stderr[name]
+        return columns
+
+    def _table(self) -> Table:
+        columns: dict[str, npt.NDArray[Any]] = {**self._numbers()}
         columns |= {"condition": self.condition, "residual_std": self.residual_std}
         columns |= {"order": self.order, "status": self.status}
         records = np.asarray(self.record_status, np.uint16)[..., np.newaxis]

@@ -24,8 +24,11 @@ class Valued(Tabular):
     _found: Estimates
 
     @property
-    def trusted(self) -> npt.NDArray[np.bool_]:
-        r"""Where values can be trusted, shape (\*, n)."""
+    def _unflagged(self) -> npt.NDArray[np.bool_]:
+        raise NotImplementedError
+
+    def _numbers(self) -> dict[str, npt.NDArray[np.float64]]:
+        """Return all parameters, each followed by its standard errors."""
         raise NotImplementedError
 
     def value(self, name: str, record: int | None = None) -> Measured:
@@ -41,8 +44,8 @@ class Valued(Tabular):
         Returns
         -------
         Measured
-            ``value`` and ``stderr`` first: those of a constant; of a parameter that changes the medians over samples that can be
-            trusted, with ``least`` and ``greatest`` for nine tenths of them. ``str()`` of it has even digits and the unit.
+            ``value`` and ``stderr`` first: those of a constant; of a parameter that changes the medians over samples whose flags let
+            trust them, with ``least`` and ``greatest`` for nine tenths of them. ``str()`` of it has even digits and the unit.
 
         Raises
         ------
@@ -58,7 +61,8 @@ class Valued(Tabular):
 
         References
         ----------
-        Medians and ranges are those of samples that are trusted; the errors are explained in docs/automatic.md, "Errors".
+        Medians and ranges are those of samples that flags let trust, whatever the verdict says of the record; the errors are explained in
+        docs/automatic.md, "Errors".
 
         Examples
         --------
@@ -82,16 +86,16 @@ class Valued(Tabular):
 
     def _values(self, record: int = 0) -> Mapping[str, Measured]:
         """Return one number for everything that has a unit, in one record."""
-        table, trusted = self._table(), self.trusted.reshape(-1, self.time.size)[record]
+        numbers, good = self._numbers(), self._unflagged.reshape(-1, self.time.size)[record]
         kinds = self.settings["kinds"]
         kinds = kinds | {name: str(kind.reshape(-1)[record]) for name, kind in self._found.kinds.items()}
         changing = [
             kinds[name] for name in ("inertia", "stiffness") if kinds[name] in {"windowed", "varying", "expanded"}
         ]
         kinds |= dict.fromkeys(("natural_frequency", "damping_ratio"), changing[0] if changing else "constant")
-        each = {name: values.reshape(-1, self.time.size)[record] for name, values in table.columns.items()}
+        each = {name: values.reshape(-1, self.time.size)[record] for name, values in numbers.items()}
         return {
-            name: number_of(each[name], each[f"{name}_stderr"], kinds[name], self.units.get(name, ""), trusted)
+            name: number_of(each[name], each[f"{name}_stderr"], kinds[name], self.units.get(name, ""), good)
             for name in each
             if f"{name}_stderr" in each
         }

@@ -5,10 +5,10 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from tvident import _core
 from tvident._arguments import explained_in_words, percent, percentiles, to_digits_of, told_once
@@ -43,6 +43,9 @@ _DOUBTS = (
     | Status.CHANNEL_SUSPECTED
 )
 """Flags of a record with which errors hold only if the model does."""
+
+_CONTRADICTED = _DOUBTS & ~Status.WINDOW_LIMIT | Status.COLOURED | Status.SCALES_DISAGREE | Status.ILL_CONDITIONED
+"""Flags of a record that contradict its equations."""
 
 _CARRIED = Status.GAP | Status.ILL_CONDITIONED
 """Flags of a sample in a gap that is farther from any equation than a window tells."""
@@ -85,7 +88,12 @@ def _verdict(result: Any, share: float | None) -> str:
     shape = result.inertia.shape[:-1]
     count = int(np.prod(shape, dtype=int))
     places = list(np.ndindex(shape))[:RECORDS]
-    reasons = {place: reason for place in places if (reason := distrust(result[place if len(place) > 1 else place[0]]))}
+    each = zip(places, result._distrusted, strict=False)  # noqa: SLF001 - of this room
+    reasons = {
+        place: words
+        for place, reason in each
+        if (words := reason or mostly_flagged(result[place if len(place) > 1 else place[0]]))
+    }
     known = _errors(result)
     words = f"{count} records: {known}" if known else f"{count} records"
     if len(places) < count:
@@ -98,12 +106,12 @@ def _verdict(result: Any, share: float | None) -> str:
 
 
 def _of_one(result: Any, known: float | None) -> str:
-    share = cache(lambda: explained(result) if known is None else known)  # a prediction of the whole record
-    # What was never measured is what else looks wrong.
-    reason = found_marked(result.advice) or _distrusted(result, share) or _found_elsewhere(result.advice)
+    if known is not None:
+        result._share = (known,)  # noqa: SLF001 - of this room
+    reason = result._distrusted[0] or mostly_flagged(result)  # noqa: SLF001 - likewise
     if reason:
         return verdict_of_distrusted(result, reason)
-    return verdict_of_trusted(result, _errors(result), share())
+    return verdict_of_trusted(result, _errors(result), explained(result))
 
 
 def found_marked(advice: Sequence[str]) -> str | None:
@@ -149,11 +157,14 @@ def explained(result: Any) -> float | None:
     before: ExplainedTorque | None = result._explained_before  # noqa: SLF001 - of this room
     if before is not None:
         return before.share
-    try:
-        _, recorded, predicted = result.predicted_torque()
-    except ValueError:
-        return None
-    return share_of(recorded, without_carried(result, predicted))
+    if result._share is None:  # noqa: SLF001 - of this room
+        try:
+            _, recorded, predicted = result.predicted_torque()
+        except ValueError:
+            return None
+        result._share = (share_of(recorded, without_carried(result, predicted)),)  # noqa: SLF001 - likewise
+    share: float | None = result._share[0]  # noqa: SLF001 - likewise
+    return share
 
 
 def without_carried(result: Any, predicted: Any) -> Any:
@@ -193,18 +204,32 @@ def share_of(recorded: Any, predicted: Any) -> float | None:
     return 1 - float(np.var((recorded - predicted)[there])) / spread if spread > 0 else None
 
 
-def distrust(result: Any) -> str | None:
-    """Return why numbers of a record are not to be trusted, in words; None where nothing says so."""
+def distrusted(result: Any) -> tuple[str | None, ...]:
+    """Return why no sample of a record is to be trusted, in words, None where nothing says so; of a batch, of its first hundred records."""
+    if not result.status.size:
+        return (None,)
+    if result.inertia.ndim == 1:
+        return (_distrusted(result, result.advice),)
+    places = list(np.ndindex(result.inertia.shape[:-1]))[:RECORDS]
+    return tuple(_distrusted_in_batch(result[place if len(place) > 1 else place[0]]) for place in places)
+
+
+def _distrusted_in_batch(result: Any) -> str | None:
     # Without what is tried of a record alone, which takes as long as to identify it, but where something is seen that spoils it.
     advice = result._chosen.advice  # noqa: SLF001 - of this room
-    if any(STAYS in line for line in advice):
-        advice = result.advice
-    return found_marked(advice) or _distrusted(result, lambda: explained(result)) or _found_elsewhere(advice)
+    return _distrusted(result, result.advice if any(STAYS in line for line in advice) else advice)
 
 
-def _distrusted(result: Any, share: Callable[[], float | None]) -> str | None:
+def _distrusted(result: Any, advice: Sequence[str]) -> str | None:
     signs = (_sign(result, name) for name in ("inertia", "damping", "stiffness"))
-    return why_not(result, lambda: next(filter(None, signs), None), share, lambda: _is_rest_noise(result))
+    # What was never measured is what else looks wrong.
+    return (
+        found_marked(advice)
+        or why_not(
+            result, lambda: next(filter(None, signs), None), lambda: explained(result), lambda: _is_rest_noise(result)
+        )
+        or _found_elsewhere(advice)
+    )
 
 
 def why_not(
@@ -213,7 +238,7 @@ def why_not(
     share: Callable[[], float | None],
     is_noise: Callable[[], bool] = lambda: False,
 ) -> str | None:
-    """Return why numbers are not to be trusted, by flags, by what is wrong with a sign, and by the share of the torque explained.
+    """Return why no number is to be trusted, by flags, by what is wrong with a sign, and by the share of the torque explained.
 
     A little of the torque is enough where the rest is its noise.
     """
@@ -229,8 +254,19 @@ def why_not(
     explains = share()
     if explains is not None and explains < _LITTLE and not is_noise():
         return f"the model explains {explained_in_words(explains)} of the torque"
-    trusted = float(np.mean(result.trusted))
-    return f"{1 - trusted:.0%} of the samples are flagged" if trusted < _LITTLE else None
+    return None
+
+
+def mostly_flagged(result: Any) -> str | None:
+    """Return how much of a record is flagged, in words, where that is most of it: the rest may be trusted, and the record is not."""
+    share = float(np.mean(unflagged(result)))
+    return f"{1 - share:.0%} of the samples are flagged" if share < _LITTLE else None
+
+
+def unflagged(result: Any) -> npt.NDArray[np.bool_]:
+    """Return which samples have numbers, and flags that do not forbid to trust them, whatever the verdict says of the record."""
+    there: npt.NDArray[np.bool_] = result._unflagged  # noqa: SLF001 - of results
+    return there
 
 
 def negative(value: Any, error: Any) -> str | None:
@@ -245,23 +281,33 @@ def negative(value: Any, error: Any) -> str | None:
 
 
 def _sign(result: Any, name: str) -> str | None:
-    """Return what is wrong with a parameter's sign: mass is never negative, and stiffness that has both signs is none."""
+    """Return what is wrong with a parameter's sign: mass is never negative, and stiffness that has both signs may be none.
+
+    A magnet, gravity or muscles make a stiffness that has both: it is believed where equations were tested and nothing contradicts them.
+    """
     if result.settings["kinds"][name] == "known":
         return None
-    value, error = getattr(result, name), result.stderr[name]
+    value, error = _believed(result, getattr(result, name)), _believed(result, result.stderr[name])
     if name != "stiffness":
         words = negative(value, error)
         return f"{name} {words}" if words else None
-    if negative(value, error) and negative(-value, error):
+    is_contradicted = result.settings["form"] == "strong" or result.record_status & _CONTRADICTED
+    if is_contradicted and negative(value, error) and negative(-value, error):
         one = result.value(name)
         ends = " to ".join(to_digits_of(end, one.stderr) for end in (one.least, one.greatest))
         return f"stiffness has both signs ({ends} {one.unit})"
     return None
 
 
+def _believed(result: Any, values: Any) -> Any:
+    """Return what is known at samples that flags let trust, where there are some and values change: signs of others tell nothing."""
+    good = unflagged(result)
+    return values[good] if good.any() and told_once(values).shape[-1] > 1 else values
+
+
 def _errors(result: Any) -> str:
     """Return how well every unknown parameter is known, relative to itself."""
-    found, trusted = [], result.trusted
+    found, trusted = [], unflagged(result)
     for name, symbol in _SYMBOLS.items():
         kind = result.settings["kinds"][name]
         if kind == "known":
