@@ -27,6 +27,9 @@ class DaskIdentification:
         What is constant over a record: numbers, or arrays in the shape of the batch. Asking computes them.
     record_status : int, or ndarray of uint16 in the shape of the batch
         Flags of whole records. Asking computes them.
+    advice : tuple of str
+        What is worth doing, of stretches that choices were made from, and in strong form what the weak form finds elsewhere in stretches.
+        Asking computes it.
     settings : dict
         What was given and chosen, as those of a result: ``settings=`` of another call repeats it. Asking computes what the record says.
     units : dict of str to str
@@ -59,6 +62,7 @@ class DaskIdentification:
     chosen: Any = field(repr=False)
     units: Mapping[str, str]
     told: Any = field(repr=False)
+    saying: Any = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         *batch, samples = self.inertia.shape
@@ -190,6 +194,17 @@ class DaskIdentification:
         tvident.Status : what flags mean.
         """
         return self._computed[1]
+
+    @cached_property
+    def advice(self) -> tuple[str, ...]:
+        """What is worth doing; in strong form first what the weak form finds elsewhere in stretches. Asking computes it.
+
+        See Also
+        --------
+        record_status : flags of the record.
+        tvident.Identification : says more.
+        """
+        return tuple(self.saying.compute()) if self.saying is not None else ()
 
     @property
     def _names(self) -> list[str]:

@@ -134,6 +134,7 @@ def identify(
         dask.delayed(_of_first, pure=True)(each[0].settings, alone=not batch),
         units,
         dask.delayed(_of_batch)([one.told for one in each], batch),
+        dask.delayed(_advice_of)([one.advice for one in each], alone=not batch),
     )
 
 
@@ -144,6 +145,13 @@ def _scaled(samples: Any, factor: float) -> Any:
 def _of_first(settings: Mapping[str, Any], *, alone: bool) -> dict[str, Any]:
     """Return the settings of a batch: standard errors of windows have factors of their own in every record."""
     return {name: one for name, one in settings.items() if alone or name != "stderr_factors"}
+
+
+def _advice_of(each: Sequence[Sequence[str] | None], *, alone: bool) -> tuple[str, ...]:
+    """Return what is worth doing, of a batch with the record that it is about."""
+    if alone:
+        return tuple(each[0] or ())
+    return tuple(f"record {place}: {line}" for place, lines in enumerate(each) for line in lines or ())
 
 
 def _of_batch(each: Sequence[tuple[Mapping[str, tuple[float, float]], int]], batch: tuple[int, ...]) -> Any:

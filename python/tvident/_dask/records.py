@@ -11,8 +11,9 @@ import numpy as np
 from tvident import _core
 from tvident._dask.blocks import blocks, imported, joined, rows, tree
 from tvident._dask.polynomials import rounding
+from tvident._equation import COEFFICIENTS, LINEAR_UNITS, UNITS
 from tvident._identify import Held, Long, Request, Span, WeakForm, requested
-from tvident._in_pieces import Choices, chosen, stretches
+from tvident._in_pieces import Choices, ToldByWeakForm, chosen, stretches, stretches_told
 from tvident._pieces import (
     Columns,
     Given,
@@ -25,6 +26,7 @@ from tvident._pieces import (
     with_neighbours,
 )
 from tvident._status import Status
+from tvident._units import ROTARY
 
 _LEAST_BLOCK = 1 << 12
 """Samples of a block: a task costs as much as some thousand of them."""
@@ -46,11 +48,14 @@ class IdentifiedBlocks:
     settings : mapping or Delayed
     told : Delayed
         Constants by name, and the flags of the record.
+    advice : Delayed
+        What is worth doing.
     """
 
     columns: Mapping[str, Any]
     settings: Any
     told: Any
+    advice: Any = None
 
 
 @dataclass(frozen=True)
@@ -114,6 +119,44 @@ def record_of(channels: Sequence[Any], given: Given, step: int) -> IdentifiedBlo
     """Return what is to be computed of one record."""
     request = requested(given.method, given.equation, given.settings, 1 / given.period)
     record = _DaskRecord(channels, _AskedOfDask(request, channels[0].shape[-1], given, step))
+    found = _identified(record, request)
+    return found if isinstance(request.form, WeakForm) or given.weighted else _with_advice(record, found)
+
+
+def _with_advice(record: _DaskRecord, found: IdentifiedBlocks) -> IdentifiedBlocks:
+    """Return what the weak form says of stretches of a record in strong form, beside what is computed."""
+    spans, step = stretches_told(record.asked.samples), record.asked.step
+    names = [*(f"{name}{end}" for name in COEFFICIENTS for end in ("", "_stderr")), "status"]
+    channels = [record.held([span]) for span in spans]
+    rows = [
+        {name: found.columns[name][-(-first // step) : -(-end // step)] for name in names if name in found.columns}
+        for first, end in spans
+    ]
+    told = record.dask.delayed(_told_by_weak_form, pure=True)
+    return replace(found, advice=told(channels, rows, spans, record.asked, record.quantisation))
+
+
+def _told_by_weak_form(
+    channels: Sequence[Sequence[Any]],
+    rows: Sequence[Columns],
+    spans: Sequence[Span],
+    asked: _AskedOfDask,
+    quantisation: float,
+) -> list[str]:
+    long, given = asked.long(quantisation), asked.given
+    places = {span: place for place, span in enumerate(spans)}
+    told = ToldByWeakForm(
+        long,
+        given,
+        lambda some: _held(channels[places[some[0]]], some),
+        lambda span: rows[places[span]],
+        0.0,
+        UNITS if given.axis.system is ROTARY else LINEAR_UNITS,
+    )
+    return told.advice(asked.samples)
+
+
+def _identified(record: _DaskRecord, request: Request) -> IdentifiedBlocks:
     if not isinstance(request.form, WeakForm) and record.plain.is_windowed:
         return _windowed(record)
     if not isinstance(request.form, WeakForm) and record.plain.is_constant:
@@ -244,7 +287,11 @@ def _alone(record: _DaskRecord) -> IdentifiedBlocks:
     columns = record.columns([finish(part, means) for part in parts], found)
     told = dask.delayed(_told, pure=True)(notes, means, choices)
     settings = dask.delayed(_settings, pure=True)(notes if choices is None else [], choices)
-    return IdentifiedBlocks(columns, settings, told)
+    return IdentifiedBlocks(columns, settings, told, dask.delayed(_advice, pure=True)(choices))
+
+
+def _advice(choices: Choices | None) -> list[str]:
+    return [] if choices is None else choices.advice
 
 
 def _choices(each: Sequence[Sequence[Any]], spans: Sequence[Span], given: Given) -> Choices:

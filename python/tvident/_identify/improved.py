@@ -24,7 +24,7 @@ from tvident._identify.settings import Request, resolve
 from tvident._identify.signals import with_own_step
 from tvident._identify.tried_record import CONTRADICTED
 from tvident._identify.used import as_used
-from tvident._results import MARKED, TRIED, Identification, Words
+from tvident._results import MARKED, TRIED, Identification, Words, median_of
 from tvident._status import Status
 from tvident._units import ROTARY
 
@@ -34,7 +34,7 @@ _LENGTHS = ("window_length", "exponent", "regression_window")
 _LARGE = 0.4
 """Radians beyond which a pendulum is no spring: the sine is 2.6 % smaller than its angle."""
 
-_TESTED = {"inertia": "auto", "damping": "auto", "stiffness": "windowed"}
+TESTED = {"inertia": "auto", "damping": "auto", "stiffness": "windowed"}
 """Kinds that the weak form tests, and the one that it takes, in place of windows that the strong form has."""
 
 _MOST = 1 << 14
@@ -186,8 +186,10 @@ class TriedInWeakForm(_AskedOfRecord):
         if weak.record_status & CONTRADICTED & ~Status.CHANNEL_SUSPECTED:
             return words
         begin, end = weak.time[[0, -1]].tolist()
-        unknown = [name for name in COEFFICIENTS if isinstance(self.given[name], str)]
-        elsewhere = contradicted(weak, strong.between(begin, end), unknown)
+        part = strong.between(begin, end)
+        elsewhere = contradicted(
+            weak, {name: median_of(part, name) for name in COEFFICIENTS if isinstance(self.given[name], str)}
+        )
         if elsewhere is None:
             return words
         rest = [line for line in words.advice if line not in weak.advice]
@@ -205,7 +207,7 @@ class TriedInWeakForm(_AskedOfRecord):
     def _in_weak_form(self, some: slice) -> Identification:
         data = self.data
         kinds = {
-            name: ("constant" if kind == "constant" else _TESTED[name]) if isinstance(kind, str) else cut(kind, some)
+            name: ("constant" if kind == "constant" else TESTED[name]) if isinstance(kind, str) else cut(kind, some)
             for name, kind in self.given.items()
         }
         asked = {**kinds, "terms": self.asked_terms, "lag": self.request.lag}

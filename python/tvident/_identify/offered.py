@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,6 +39,8 @@ _CONTRADICTS, _BY_WEAK_FORM = 4.0, 0.02
 
 Of records whose parameters change smoothly the strong form is off by less than that, beside its standard errors.
 """
+
+_SCAN = "find out with result.scan() whether shorter windows agree"
 
 _AGAINST = 0.1
 """A share of a weight that a negative stiffness beside it may have: with more the two are distinguished by nothing."""
@@ -165,7 +167,9 @@ def moved(
     return "".join(words)
 
 
-def contradicted(weak: Identification, strong: Identification, unknown: Sequence[str]) -> str | None:
+def contradicted(
+    weak: Identification, strong: Mapping[str, tuple[float, float]], begin: float = 0.0, cure: str = _SCAN
+) -> str | None:
     """Return which parameters the weak form finds elsewhere with the same equation, in words; None where it finds the same.
 
     Spikes, clipped samples and places at which parts are joined spoil every polynomial that holds one, and polynomials that are too smooth
@@ -175,20 +179,19 @@ def contradicted(weak: Identification, strong: Identification, unknown: Sequence
     ----------
     weak : Identification
         Of a part of a record; nothing contradicts it.
-    strong : Identification
-        Of the same samples.
-    unknown : sequence of str
-        What was not given.
+    strong : mapping of str to (float, float)
+        What the strong form finds of the same samples, with errors, of what was not given.
+    begin : float, optional
+        Time of the first sample of a record whose times are not those of the part.
+    cure : str, optional
+        What else can be done about it.
     """
     words = []
-    for name in unknown:
-        (was, error), (value, least) = median_of(strong, name), median_of(weak, name)
+    for name, (was, error) in strong.items():
+        value, least = median_of(weak, name)
         if abs(value - was) > max(_CONTRADICTS * np.hypot(error, least), _BY_WEAK_FORM * abs(value)):
             words.append(f"{name}{BECOMES}{with_error(value, least)} {weak.units[name]}")
     if not words:
         return None
-    begin, end = weak.time[[0, -1]].tolist()
-    return (
-        f"{OF_WEAK_FORM} at {begin:.4g}-{end:.4g} s, and nothing contradicts them: {', '.join(words)}: use method='auto', or find out "
-        "with result.scan() whether shorter windows agree"
-    )
+    first, end = (begin + weak.time[[0, -1]]).tolist()
+    return f"{OF_WEAK_FORM} at {first:.4g}-{end:.4g} s, and nothing contradicts them: {', '.join(words)}: use method='auto', or {cure}"

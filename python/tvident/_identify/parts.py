@@ -19,6 +19,7 @@ from tvident._identify.batch import estimates
 from tvident._identify.call import identify
 from tvident._identify.channels import MotionChannels
 from tvident._identify.data import Data
+from tvident._identify.improved import TESTED
 from tvident._identify.methods import Method, StrongForm
 from tvident._identify.prepared import prepared
 from tvident._identify.searched import Searched
@@ -239,6 +240,18 @@ class Long(Task):
     def known(self) -> list[str]:
         """Names of what is known."""
         return list(self._known)
+
+    @property
+    def in_weak_form(self) -> dict[str, Any]:
+        """Arguments of :func:`identify` that ask the weak form for the same equation, with what it tests in place of windows."""
+        settings, known = self.settings(), self.values_known()
+        kinds = {name: known[name][0] if kind == "known" else kind for name, kind in settings["kinds"].items()}
+        given = {
+            name: kind if kind == "constant" or name in known else TESTED[name]
+            for name, kind in kinds.items()
+            if name in COEFFICIENTS
+        }
+        return {**given, "terms": [name for name, _ in settings["terms"]], "lag": settings["lag"]}
 
     def polynomials(self, held: Held, wanted: Span) -> _core.LocalEstimates:
         """Return what is known of the polynomials around some samples."""

@@ -35,6 +35,8 @@ class FileIdentification:
         Units of the columns by name.
     advice : tuple of str
         What is worth doing, of pieces and of the stretches that choices were made from.
+    verdict : str
+        How well parameters are known, or why not to trust them, by rows that are spread over the file.
     assumed : dict of str to str
         Those of angle and torque of which neither the file nor the call said the unit, and what they were taken for.
 
@@ -65,6 +67,7 @@ class FileIdentification:
     units: Mapping[str, str]
     advice: tuple[str, ...] = ()
     assumed: Mapping[str, str] = field(default_factory=dict)
+    verdict: str = ""
 
     def __repr__(self) -> str:
         named = [
@@ -75,7 +78,7 @@ class FileIdentification:
         return f"<FileIdentification of {self.samples} samples, {self.rows} rows in {self.path}{found}>"
 
     def summary(self) -> str:
-        """Return in words what was found, and what is worth doing.
+        """Return in words what was found, first the verdict, and what is worth doing.
 
         Returns
         -------
@@ -86,7 +89,8 @@ class FileIdentification:
         Identification.summary : of a recording in memory.
         identify_file : writes the numbers.
         """
-        lines = [f"{self.samples} samples, {self.rows} rows in {self.path}"]
+        lines = [self.verdict] if self.verdict else []
+        lines += [f"{self.samples} samples, {self.rows} rows in {self.path}"]
         lines += [
             f"{name} = {arguments.with_error(value, error)} {self.units.get(name, '')}".rstrip()
             for name, (value, error) in self.constants.items()

@@ -9,20 +9,27 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tvident import _core
 from tvident._equation import LINEAR_UNITS, UNITS
 from tvident._files import errors_name, put_in_place
 from tvident._identify import Long, Span, WeakForm, requested
 from tvident._in_pieces.choices import chosen, stretches
 from tvident._in_pieces.found import FileIdentification
+from tvident._in_pieces.judged import JudgedRows
 from tvident._in_pieces.kept import Kept
 from tvident._in_pieces.outputs import CHUNK, OutputTable, head_of_rows, holds_rows, writer
 from tvident._in_pieces.recorded import RecordingOfFile
 from tvident._in_pieces.rows import row_of
+from tvident._in_pieces.told_by_weak_form import ToldByWeakForm
 from tvident._in_pieces.work import Alone, WindowsWork, Work
 from tvident._pieces import SHARED, Columns, Given, Mean, means_of, reach_of
 from tvident._status import Status
 from tvident._units import ROTARY
+
+_SPREAD = 64
+"""Stretches of rows that are judged, and rows of each."""
 
 
 class AskedOfFile:
@@ -185,7 +192,11 @@ class Run:
             settings = notes[0]["settings"]
             advice += notes[0]["advice"]
         constants = {name: (mean.value, mean.error) for name, mean in means.items()}
+        advice = [*self._told_by_weak_form(work, means), *advice]
+        judged = JudgedRows(self._some_rows(work, means), status, advice, settings, self._asked.units)
+        verdict = judged.verdict() if self._kept.count else "no verdict: there are no rows"
         told = {"settings": settings, "constants": constants, "record_status": int(status), "advice": advice}
+        told["verdict"] = verdict
         self._put_in_place(work, means, told)
         flags, rows = self._kept.flags, self._kept.count
         self._kept.remove()
@@ -200,7 +211,46 @@ class Run:
             self._asked.units,
             tuple(advice),
             self._asked.recording.assumed,
+            verdict,
         )
+
+    def _told_by_weak_form(self, work: Work, means: Mapping[str, Mean]) -> list[str]:
+        """Return what the weak form says of stretches of a record in strong form."""
+        asked, long = self._asked, self._asked.long
+        if long is None or asked.given.weighted:
+            return []
+        step = asked.step
+
+        def rows(span: Span) -> Columns:
+            return self._rows(work, means, (-(-span[0] // step), -(-span[1] // step)))
+
+        told = ToldByWeakForm(long, asked.given, asked.recording.held, rows, asked.recording.begin, asked.units)
+        return told.advice(self._samples)
+
+    def _some_rows(self, work: Work, means: Mapping[str, Mean]) -> Columns:
+        """Return rows that are spread over the result."""
+        count = self._kept.count
+        firsts = range(0, count, max(_SPREAD, -(-count // _SPREAD)))
+        each = [self._rows(work, means, (first, min(first + _SPREAD, count))) for first in firsts]
+        return {name: np.concatenate([one[name] for one in each]) for name in each[0]} if each else {}
+
+    def _rows(self, work: Work, means: Mapping[str, Mean], span: Span) -> Columns:
+        """Return some rows as they are written, whichever pieces they are of."""
+        found: list[Columns] = []
+        for note, (first, last) in zip(self._kept.notes, self._rows_of_pieces(), strict=True):
+            begin, end = max(span[0], first), min(span[1], last)
+            if begin < end:
+                found.append(self._finished(work, note, (begin, end), means))
+        return {name: np.concatenate([one[name] for one in found]) for name in found[0]} if found else {}
+
+    def _rows_of_pieces(self) -> list[Span]:
+        """Return which rows are those of each piece."""
+        step, done, found = self._asked.step, 0, []
+        for first, end in self._pieces:
+            last = done + len(range(first + -first % step, end, step))
+            found.append((done, last))
+            done = last
+        return found
 
     def _put_in_place(self, work: Work, means: Mapping[str, Mean], told: Mapping[str, Any]) -> None:
         """Write all columns to where the result is to be."""
@@ -210,12 +260,9 @@ class Run:
         some = self._finished(work, notes[0], (0, min(1, self._kept.count)), means)
         kinds = {name: values.dtype for name, values in some.items()}
         with writer(self._output, OutputTable(kinds, self._kept.count, self._asked.units, told)) as put:
-            done = 0
-            for note, piece in zip(notes, self._pieces, strict=True):
-                last = done + len(range(piece[0] + -piece[0] % self._asked.step, piece[1], self._asked.step))
-                for begin in range(done, last, CHUNK):
+            for note, (first, last) in zip(notes, self._rows_of_pieces(), strict=True):
+                for begin in range(first, last, CHUNK):
                     put(self._finished(work, note, (begin, min(begin + CHUNK, last)), means))
-                done = last
 
     def _contradictions(self, means: Mapping[str, Mean]) -> list[str]:
         """Return what is to be said of constants that are none."""

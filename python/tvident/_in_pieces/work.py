@@ -100,7 +100,7 @@ class Alone:
         span = with_neighbours(wanted, self.reach, samples, self.step)
         result = self.identified(self.recording.held([span]), report, wanted=wanted)
         columns, note = part_alone(result, span, wanted, self.step)
-        if span[1] - span[0] == samples:
+        if span[1] - span[0] == samples and result.settings["form"] == "weak":
             note |= {"settings": result.settings, "advice": list(result.advice)}
         return {"time": self.recording.times(*wanted, self.step), **columns}, note
 

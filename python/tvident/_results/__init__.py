@@ -24,6 +24,8 @@ from tvident._results.told import Telling
 from tvident._results.torque import correlated_with, kernels_of, touched_by
 from tvident._results.verdict import (
     CHANGING,
+    SYMBOLS,
+    found_elsewhere,
     found_marked,
     known_to,
     mostly_flagged,
@@ -49,6 +51,7 @@ __all__ = [
     "OF_WEAK_FORM",
     "POOR",
     "STAYS",
+    "SYMBOLS",
     "TRIED",
     "UNTOLD_LAG",
     "Estimates",
@@ -73,6 +76,7 @@ __all__ = [
     "curves_from",
     "every_sample",
     "explained_steps",
+    "found_elsewhere",
     "found_marked",
     "from_file",
     "in_units_of",

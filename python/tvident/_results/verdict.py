@@ -17,7 +17,7 @@ from tvident._results.words import BECOMES, CONDITIONS, MARKED, OF_WEAK_FORM, OT
 from tvident._status import Status
 from tvident._units import in_words_of
 
-_SYMBOLS = {"stiffness": "K", "inertia": "I", "damping": "C"}
+SYMBOLS = {"stiffness": "K", "inertia": "I", "damping": "C"}
 """In the order in which they are told."""
 
 CHANGING = frozenset({"windowed", "varying", "expanded"})
@@ -121,9 +121,9 @@ def found_marked(advice: Sequence[str]) -> str | None:
     return None
 
 
-def _found_elsewhere(advice: Sequence[str]) -> str | None:
+def found_elsewhere(advice: Sequence[str]) -> str | None:
     """Return which parameters an equation that explains more, or the weak form, finds elsewhere, in words."""
-    names = [name for name in _SYMBOLS if any(f" {name}{BECOMES}" in line for line in advice)]
+    names = [name for name in SYMBOLS if any(f" {name}{BECOMES}" in line for line in advice)]
     if not names:
         return None
     others = f"finds another {' and another '.join(names)}"
@@ -228,7 +228,7 @@ def _distrusted(result: Any, advice: Sequence[str]) -> str | None:
         or why_not(
             result, lambda: next(filter(None, signs), None), lambda: explained(result), lambda: _is_rest_noise(result)
         )
-        or _found_elsewhere(advice)
+        or found_elsewhere(advice)
     )
 
 
@@ -308,7 +308,7 @@ def _believed(result: Any, values: Any) -> Any:
 def _errors(result: Any) -> str:
     """Return how well every unknown parameter is known, relative to itself."""
     found, trusted = [], unflagged(result)
-    for name, symbol in _SYMBOLS.items():
+    for name, symbol in SYMBOLS.items():
         kind = result.settings["kinds"][name]
         if kind == "known":
             continue
