@@ -99,3 +99,12 @@ def test_a_spoilt_record_of_a_batch_is_named() -> None:
     assert not any("spikes" in line for line in both[0].advice)
     assert both[1].summary().startswith(NAMED)
     assert any(line.startswith("3 samples of the angle stand far out") for line in both[1].advice)
+
+
+def test_a_constant_that_changes_is_named_by_the_weak_form() -> None:
+    """Of a stiffness that follows a slider "59 % of the torque" was all that was said, with an inertia 10 errors off."""
+    rig = tvident.simulate_torsional_rig(6.0)
+    found = identified(rig.angle, rig.torque, **CONSTANT)
+    assert any(line.startswith("in weak form: stiffness was given as constant, but parts") for line in found.advice)
+    assert "errors hold if the model does" in found.summary().splitlines()[0]
+    assert not any(" was given as constant" in line for line in identified(rig.angle, rig.torque).advice)

@@ -28,7 +28,7 @@ from tvident._advice.scales import disagreement, scales_compared
 from tvident._advice.torque import OF_TORQUE, told_by_torque
 from tvident._arguments import listed
 from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, UNITS
-from tvident._results import Words
+from tvident._results import NOT_CONSTANT, Words
 from tvident._status import Status
 
 _SHOWN = 6
@@ -372,8 +372,7 @@ class Explained:
             if name in COEFFICIENTS:
                 kind = "windowed" if name == "stiffness" else "auto"
                 words.append(
-                    f"{name} was given as constant, but parts of the record differ by {one.test.spread:.0%}: give {name}={kind!r}, or "
-                    "split the record"
+                    f"{name}{NOT_CONSTANT} by {one.test.spread:.0%}: give {name}={kind!r}, or split the record"
                 )
             else:
                 words.append(

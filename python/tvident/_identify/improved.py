@@ -24,7 +24,7 @@ from tvident._identify.settings import Request, resolve
 from tvident._identify.signals import with_own_step
 from tvident._identify.tried_record import CONTRADICTED
 from tvident._identify.used import as_used
-from tvident._results import MARKED, TRIED, Identification, Words, median_of
+from tvident._results import MARKED, NOT_CONSTANT, TRIED, Identification, Words, median_of
 from tvident._status import Status
 from tvident._units import ROTARY
 
@@ -176,15 +176,16 @@ class TriedInWeakForm(_AskedOfRecord):
         remedy = next((line for line in weak.advice if TRIED in line), None)
         if remedy is None:
             return self._unless_contradicted(result, weak, words)
+        remedies = (f"in weak form: {remedy}", *_not_constant(weak))
         starts = tuple(beginning for one in BUILT_IN.values() for beginning in one.beginnings)
         rest = [line for line in words.advice if not (line.startswith(starts) and ": give terms=" in line)]
-        return replace(words, advice=(f"in weak form: {remedy}", *rest))
+        return replace(words, advice=(*remedies, *rest))
 
     def _unless_contradicted(self, strong: Identification, weak: Identification, words: Words) -> Words:
         """Return words that begin with what the weak form finds elsewhere of a part of the record, where nothing contradicts it."""
         # What a recorder spoilt is left out there, and said.
         if weak.record_status & CONTRADICTED & ~Status.CHANNEL_SUSPECTED:
-            return words
+            return replace(words, advice=(*_not_constant(weak), *words.advice))
         begin, end = weak.time[[0, -1]].tolist()
         part = strong.between(begin, end)
         elsewhere = contradicted(
@@ -226,6 +227,11 @@ class TriedInWeakForm(_AskedOfRecord):
                 passed=(passed.get("angle"), passed.get("torque")),
             )
         return self.run(request, part, diagnose=True)
+
+
+def _not_constant(weak: Identification) -> list[str]:
+    """Return what the weak form says of parameters that were given as constant and are not, which the strong form does not test."""
+    return [f"in weak form: {line}" for line in weak.advice if NOT_CONSTANT in line]
 
 
 def _busiest(data: Data, length: int) -> slice:

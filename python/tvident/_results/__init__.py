@@ -39,7 +39,18 @@ from tvident._results.verdict import (
     why_not,
 )
 from tvident._results.windows_beside import WindowsBeside
-from tvident._results.words import BECOMES, FED_BACK, MARKED, OF_WEAK_FORM, STAYS, TRIED, UNTOLD_LAG, Words, of_batch
+from tvident._results.words import (
+    BECOMES,
+    FED_BACK,
+    MARKED,
+    NOT_CONSTANT,
+    OF_WEAK_FORM,
+    STAYS,
+    TRIED,
+    UNTOLD_LAG,
+    Words,
+    of_batch,
+)
 
 __all__ = [
     "BECOMES",
@@ -48,6 +59,7 @@ __all__ = [
     "FED_BACK",
     "KIND_OF_LISTS",
     "MARKED",
+    "NOT_CONSTANT",
     "OF_WEAK_FORM",
     "POOR",
     "STAYS",

@@ -25,8 +25,9 @@ STAYS = "or use method='auto', which "
 
 FED_BACK = "the torque holds the angle's noise"
 UNTOLD_LAG = "the record does not tell half a sample of lag"
-CONDITIONS = (FED_BACK, UNTOLD_LAG)
-"""How advice begins that says on what errors depend."""
+NOT_CONSTANT = " was given as constant, but parts of the record differ"
+CONDITIONS = (FED_BACK, UNTOLD_LAG, NOT_CONSTANT)
+"""What advice says on which errors depend."""
 
 
 @dataclass(frozen=True)
