@@ -160,7 +160,7 @@ T0 = 05.01.2024 10:00:00
         ("t,x [deg],x [deg]\n0,1,2\n1,2,3\n", {"t": [0, 1], "x [deg]": [1, 2], "x_2 [deg]": [2, 3]}, "called x_2 .deg"),
         (
             "Model Outputs\n100\n,,S:Ankle,,S:Moment,\nFrame,Sub Frame,X,Y,X,Y\n,,deg,deg,N.mm,N.mm\n1,0,2,3,4,5\n2,0,2,3,4,5\n",
-            {"Frame": [1, 2], "Sub Frame": [0, 0]}
+            {"time [s]": [0, 0.01], "Frame": [1, 2], "Sub Frame": [0, 0]}
             | {
                 "S:Ankle.X [deg]": [2, 2],
                 "S:Ankle.Y [deg]": [3, 3],

@@ -32,7 +32,8 @@ def test_the_rate_of_the_second_line_makes_times(tmp_path: Path, end: str) -> No
         warnings.simplefilter("error")
         recording = tvident.read_recording(path)
     assert recording.sample_rate == 1000
-    assert recording.units == {"time": "s", "Encoder - Angle.Angle": "deg", "Torque Cell - Torque.Mz": "N.mm"}
+    units = {"Encoder - Angle.Angle": "deg", "Torque Cell - Torque.Mz": "N.mm"}
+    assert recording.units == {"time": "s", "Frame": "", "Sub Frame": "", **units}
     np.testing.assert_allclose(recording["Angle"], ANGLE, atol=1e-9)
     np.testing.assert_allclose(recording["Mz"], MOMENT, atol=1e-9)
     np.testing.assert_allclose(recording["time"], np.arange(COUNT) / 1000, atol=1e-12)

@@ -62,7 +62,7 @@ class DaskIdentification:
     chosen: Any = field(repr=False)
     units: Mapping[str, str]
     told: Any = field(repr=False)
-    saying: Any = field(default=None, repr=False)
+    _saying: Any = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         *batch, samples = self.inertia.shape
@@ -204,7 +204,7 @@ class DaskIdentification:
         record_status : flags of the record.
         tvident.Identification : says more.
         """
-        return tuple(self.saying.compute()) if self.saying is not None else ()
+        return tuple(self._saying.compute()) if self._saying is not None else ()
 
     @property
     def _names(self) -> list[str]:

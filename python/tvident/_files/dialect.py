@@ -145,7 +145,12 @@ def _starts(lines: Sequence[str]) -> list[_Start]:
             if separator in found and found[separator].agree > 1:
                 continue
             cells = numbers(line, separator)
-            if not cells or _counts(cells, lines[:index], lines[index + 1 : index + 1 + _COMPARED], separator):
+            below = lines[index + 1 : index + 1 + _COMPARED]
+            if (
+                not cells
+                or _counts(cells, lines[:index], below, separator)
+                or _are_above_names(cells, below, separator)
+            ):
                 continue
             following = [one for one in lines[index : index + 2 * _COMPARED] if without_comment(one).strip()]
             agree = _agreeing(cells, [numbers(one, separator) for one in following[:_COMPARED]])
@@ -191,6 +196,13 @@ def _counts(cells: list[str], above: Sequence[str], below: Sequence[str], separa
         return False
     fractions = sum(_FRACTION.search(cell) is not None for row in rows for cell in row)
     return fractions >= _MOSTLY * columns * len(rows) and not _goes_on(cells[0], [row[0] for row in rows])
+
+
+def _are_above_names(cells: list[str], below: Sequence[str], separator: Separator) -> bool:
+    """Return whether cells without a first one stand above a line of as many that holds no number, as numbers of bodies do."""
+    following = next((line for line in below if without_comment(line).strip()), "")
+    words = split(following, separator)
+    return not cells[0] and len(words) == len(cells) and not any(map(_is_number, filter(None, words)))
 
 
 def _are_words(cells: Sequence[str], columns: int) -> bool:

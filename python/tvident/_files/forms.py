@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
-from tvident._files import acqknowledge, vicon
+from tvident._files import acqknowledge, motive, stamped_lines, vicon
 from tvident._files.channels import Channels, Say
 from tvident._files.named_cells import form_of, read_named_cells
 from tvident._files.oscilloscopes import START, read_scope
@@ -18,6 +19,9 @@ def read_any_text(path: Path, say: Say) -> Channels:
         return read_scope(read_whole(path), read_columns, say)
     if acqknowledge.START.match(start):
         return acqknowledge.read_acqknowledge(read_whole(path), read_columns, say)
+    for of_program in (stamped_lines, motive):
+        if of_program.START.match(start):
+            return read_columns(io.StringIO(of_program.plain_text(read_whole(path))), say)
     if vicon.START.match(start):
         return vicon.read_vicon(read_whole(path), read_columns, say)
     form = form_of(start)

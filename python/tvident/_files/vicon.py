@@ -43,7 +43,7 @@ def read_vicon(text: str, read: Callable[[TextIO, Say], Channels], say: Say) -> 
 
 
 def _timed(found: Channels, rate: float, say: Say) -> Channels:
-    """Return channels with times in place of frames and their parts."""
+    """Return channels with times before frames and their parts."""
     if not rate > 0:
         raise FileError(f"line 2 must have the samples per second; it has {rate:g}; export it again")
     frame, part = found.get(_FRAME), found.get(_PART)
@@ -57,5 +57,4 @@ def _timed(found: Channels, rate: float, say: Say) -> Channels:
     if lost.size:
         line = printable(f"frame {frame[lost[0] + 1]:g}")
         say(f"frames do not follow each other, first before {line}: times are those of the frames")
-    rest = {name: values for name, values in found.items() if name not in {_FRAME, _PART}}
-    return {with_unit("time", "s"): times, **rest}
+    return {with_unit("time", "s"): times, **found}

@@ -44,6 +44,11 @@ _BEHIND_A_WORD = re.compile(r"(.*[a-z])(Deg|Degrees|Rad|Radians|MRad|Nm|Nmm|Ms|M
 """The same at the end of a name that capitals divide into words."""
 _OF_TORQUES = re.compile(r"(.*(?:torque|moment|effort|tau).*?)[_\s]+(nmm?|mnm|knm)", re.IGNORECASE | re.DOTALL)
 """Units that would be lengths elsewhere."""
+_OF_TURNS = re.compile(
+    r"(.*(?:angle|position|rotation|theta|phi|winkel).*?)[_\s]+(turns|revs|revolutions|rev)", re.IGNORECASE | re.DOTALL
+)
+"""Turns that an angle is in; ``rev`` alone may mean another thing, and is asked for."""
+_TURNS = {"turns": "turns", "revs": "revs", "revolutions": "revolutions", "rev": "_rev"}
 _TORQUES = {"nm": "Nm", "nmm": "Nmm", "mnm": "mNm", "knm": "kNm"}
 
 
@@ -85,9 +90,10 @@ def _without_brackets(name: str) -> tuple[str, str]:
     found = _BEHIND_A_SIGN.fullmatch(name)
     if found and _is_unit_of(found[2], found[1]):
         return found[1], found[2].strip()
-    found = _OF_TORQUES.fullmatch(name)
-    if found:
-        return found[1], found[2] if found[2] in DOUBTFUL else _TORQUES[found[2].lower()]
+    for pattern, units in ((_OF_TORQUES, _TORQUES), (_OF_TURNS, _TURNS)):
+        found = pattern.fullmatch(name)
+        if found:
+            return found[1], found[2] if found[2] in DOUBTFUL else units[found[2].lower()]
     found = _OF_TIMES.fullmatch(name)
     if found:
         unit = (found[2] or found[3]).lower()

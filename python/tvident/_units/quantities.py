@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -25,6 +26,9 @@ _WEIGHT_ON_AN_ARM = (1, 1, *NONE[2:])
 
 _IN_GRAVITY = dict.fromkeys(("g", "G", "gn", "g_n"), GRAVITY) | {"mg": 1e-3 * GRAVITY}
 """What accelerometers measure in, which is a mass elsewhere."""
+
+_COUNTS = re.compile(r"inc(rement)?s?|incr|counts?|cnts?|ct?s|tic(k)?s?|pulses?|qc|lsb", re.IGNORECASE)
+"""What encoders count in."""
 
 _SHOWN = 60
 """Characters of what is no unit."""
@@ -127,6 +131,8 @@ def factor_to(system: System, quantity: str, text: str | None, *, name: str) -> 
             f"the unit of {name} must mean one thing; got {text!r}: {doubt}; give {quantity}_unit={meant!r}, or another"
         )
     part = "; a percentage must be multiplied by the torque of 1 %" if quantity == "torque" and "%" in text else ""
+    if quantity == "angle" and _COUNTS.fullmatch(text.strip("[](){}<> .")):
+        part = "; multiply counts of an encoder by 2π over those of a turn"
     if unit is None:
         raise UnitError(f"the unit of {name} must be one that is known; got {text[:_SHOWN]!r}; {cure}{part}")
     factor = _in(unit, system.dimensions[quantity])
