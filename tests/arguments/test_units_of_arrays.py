@@ -171,3 +171,32 @@ def test_derivatives_say_their_unit_where_time_has_one() -> None:
     late = tvident.fit_local_polynomials(angle, 51, t=tvident.Channel(1000 * np.asarray(RIG.time) + 500, "ms"))
     assert_allclose(late.time, np.asarray(RIG.time) + 0.5, rtol=1e-12)
     assert_allclose(late.derivatives, fit.derivatives, rtol=1e-6, atol=1e-6 * np.abs(fit.derivatives).max())
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        (("elbow", "angle [deg]"), ("elbow", "torque [N mm]")),
+        (("angle", "deg"), ("torque", "Nmm")),
+        (("elbow", "angle", "deg"), ("elbow", "torque", "N mm")),
+    ],
+)
+def test_a_unit_in_any_level_of_a_name_is_asked_about(columns: tuple[tuple[str, ...], ...]) -> None:
+    """Columns of two levels were in rad and N m without a word: .215 kg m² for .0123."""
+    rig = tvident.simulate_torsional_rig(2.0)
+    table = pd.DataFrame({columns[0]: np.degrees(rig.angle), columns[1]: 1000 * rig.torque})
+    with pytest.raises(ValueError, match="the angle must say its unit where its name says 'deg'"):
+        tvident.identify(table[columns[0]], table[columns[1]], sample_rate=1000)
+    found = tvident.identify(
+        table[columns[0]], table[columns[1]], sample_rate=1000, angle_unit="deg", torque_unit="N mm"
+    )
+    assert found.value("inertia").value == pytest.approx(0.0123, rel=0.02)
+
+
+def test_periods_of_pandas_tell_times() -> None:
+    """The sample period was asked for."""
+    rig = tvident.simulate_torsional_rig(2.0)
+    index = pd.period_range("2024-01-01", periods=rig.angle.size, freq="ms")
+    found = tvident.identify(pd.Series(rig.angle, index=index), pd.Series(rig.torque, index=index))
+    assert found.settings["sample_rate"] == pytest.approx(1000)
+    assert found.to_pandas().index.equals(index)

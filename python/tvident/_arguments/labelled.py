@@ -70,7 +70,10 @@ def _cure_of_unit(name: Any, step: float) -> str:
 def _labels(values: Any) -> list[tuple[Any, Any]]:
     """Return what labels the samples of a container, and how it is called."""
     if package_of(values) == "pandas" and hasattr(values, "index"):
-        return [(getattr(values.index, "name", None), values.index)]
+        index = values.index
+        # Spans of time begin at their stamps.
+        is_spans = hasattr(index, "to_timestamp") and hasattr(index, "end_time")
+        return [(getattr(index, "name", None), index.to_timestamp() if is_spans else index)]
     if package_of(values) == "xarray" and hasattr(values, "dims") and hasattr(values, "coords"):
         return [(dim, values.coords[dim]) for dim in values.dims if dim in values.coords]
     return []

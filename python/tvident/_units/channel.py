@@ -222,9 +222,17 @@ def unit_named(values: Any) -> str:
         return _common(unit_named, values)
     columns = getattr(values, "columns", None) if hasattr(values, "to_numpy") else None
     names = [getattr(values, "name", None)] if columns is None else list(columns)
-    units = {named_unit(name)[1] for name in names if isinstance(name, str)}
+    units = {_unit_of_levels(name) for name in names if isinstance(name, str | tuple)}
     unit = units.pop() if len(units) == 1 else ""
     return unit if unit_of(unit) is not None else ""
+
+
+def _unit_of_levels(name: str | tuple[Any, ...]) -> str:
+    """Return the unit in a name, of several levels in the one that has one: ``("elbow", "angle [deg]")``, ``("angle", "deg")``."""
+    levels = (name,) if isinstance(name, str) else name
+    units = dict.fromkeys(named_unit(level)[1] for level in levels if isinstance(level, str))
+    known = [unit for unit in units if unit and unit_of(unit) is not None]
+    return known[0] if len(known) == 1 else ""
 
 
 def are_as_named(times: Any, unit: str) -> bool:
