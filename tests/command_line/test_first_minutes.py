@@ -154,6 +154,12 @@ def test_a_member_of_a_structure_is_found_by_the_name_that_it_is_listed_with() -
     np.savez("bare.npz", **channels)
     asked = run("identify", "bare.npz", "--angle", "angle", "--torque", "torque")
     assert "it may be --sample-rate 500, as fs [kHz] says" in asked.stderr
+    said: dict[str, Any] = {"dt": 0.002, "Ts [ms]": 2.0, "trial.fs": np.array([500.0, 500.0])}
+    for name, value in said.items():
+        beside: dict[str, Any] = {"angle": np.ones(9), "torque": np.ones(9), name: value}
+        np.savez("rate.npz", **beside)
+        asked = run("identify", "rate.npz", "--angle", "angle", "--torque", "torque")
+        assert f"it may be --sample-rate 500, as {name} says" in asked.stderr, name
     wrong = run(*call.split())
     assert "is the time in milliseconds? Then give --time-unit ms with --time or --delta" in wrong.stdout
 

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from tvident import recordings
 from tvident._files import (
+    FileRecording,
     StatedRate,
     ending_by,
     full_name,
@@ -28,6 +29,9 @@ from tvident._files import (
     time_channels,
 )
 from tvident._units import Channel, UnitError, factor_between, named_unit
+
+_FEW = 64
+"""Numbers of trials that may all say one thing."""
 
 _RATES = {"fs", "fsamp", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency"}
 """What a sample rate is called beside channels, without blanks and lines."""
@@ -94,6 +98,15 @@ def _rate_in(channels: recordings.Channels) -> str:
             continue
         if 0 < rate < np.inf:
             return f"; it may be --sample-rate {rate:.10g}, as {printable(name)} says"
+    for name, value in channels.items():
+        # A period; of trials each may say the same.
+        if value.size > _FEW or np.unique(value).size != 1:
+            continue
+        try:
+            rate = FileRecording({name: value.reshape(-1)[:1]}).sample_rate
+        except ValueError:
+            continue
+        return f"; it may be --sample-rate {rate:.10g}, as {printable(name)} says"
     return ""
 
 

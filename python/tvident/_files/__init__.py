@@ -3,6 +3,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from tvident._files.arrow_names import named_field, units_of_table
 from tvident._files.beside import check_beside, place_beside, settings_beside, write_settings
 from tvident._files.channels import Channels, FileError, FileWarning, channel, full_name
 from tvident._files.names import listed, printable
@@ -45,6 +46,7 @@ __all__ = [
     "keeps_result",
     "listed",
     "marks_given",
+    "named_field",
     "other_rate",
     "place_beside",
     "printable",
@@ -57,6 +59,7 @@ __all__ = [
     "settings_beside",
     "stated_rate",
     "time_channels",
+    "units_of_table",
     "without_marks",
     "write_csv",
     "write_result",

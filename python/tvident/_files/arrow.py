@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from tvident._files.arrow_names import NO_NAME, flat_columns, named_field, units_of_table
 from tvident._files.channels import Channels, FileError, Say, check_count
 from tvident._files.names import listed, printable
 from tvident._units import named_unit, with_unit
@@ -34,17 +35,18 @@ def read_arrow(path: Path, say: Say) -> Channels:
     check_count(table.num_columns)
     channels: Channels = {}
     skipped: list[str] = []
-    for field, column in zip(table.schema, table.columns, strict=True):
-        name = field.name
-        metadata = {key.decode(errors="replace").lower(): text for key, text in (field.metadata or {}).items()}
-        unit = (metadata.get("unit") or metadata.get("units") or b"").decode(errors="replace")
+    units = units_of_table(table.schema.metadata)
+    for field, column in flat_columns(pa, table):
+        name, unit = named_field(field, units)
         values = _numbers(pa, column)
         if values is None:
             skipped.append(f"{name} ({field.type})")
             continue
         if pa.types.is_timestamp(field.type):
             say(f"column '{printable(name, 40)}' holds times: read as seconds since {column[0]}")
+        if pa.types.is_timestamp(field.type) or pa.types.is_duration(field.type):
             unit = "s"
+            name = "time" if name == NO_NAME and not {"time", "time [s]"} & channels.keys() else name
         channels[name if named_unit(name)[1] else with_unit(name, unit)] = values
     if skipped:
         say(f"not read: {listed(skipped)}; channels are numbers")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tvident._files import FileError, printable
+from tvident._files import FileError, named_field, printable, units_of_table
 from tvident._units import named_unit, with_unit
 
 _BATCH = 1 << 17
@@ -58,11 +58,11 @@ class ParquetRows:
         import pyarrow as pa  # noqa: PLC0415 - an extra
 
         found = {}
+        units = units_of_table(self._file.schema_arrow.metadata)
         for one in self._file.schema_arrow:
             if pa.types.is_integer(one.type) or pa.types.is_floating(one.type):
-                said = {key.decode(errors="replace").lower(): text for key, text in (one.metadata or {}).items()}
-                unit = (said.get("unit") or said.get("units") or b"").decode(errors="replace")
-                found[one.name if named_unit(one.name)[1] else with_unit(one.name, unit)] = one.name
+                name, unit = named_field(one, units)
+                found[name if named_unit(name)[1] else with_unit(name, unit)] = one.name
         return found
 
     def begin_of_group(self, sample: int) -> int:
