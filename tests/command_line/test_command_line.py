@@ -363,3 +363,18 @@ def test_a_sample_rate_may_have_its_unit(recording: Path, rate: str) -> None:
         for one in ("1000", rate)
     )
     assert plain == said != ""
+
+
+def test_derivatives_take_the_unit_of_times(tmp_path: Path) -> None:
+    """They said "give time_unit='ns'", which no option was."""
+    stamps = 1_600_000_000_000_000_000 + np.arange(2000, dtype=np.int64) * 1_000_000
+    np.savez(tmp_path / "echo.npz", time=stamps, x=np.sin(np.arange(2000) / 50))
+    call = ("derivatives", tmp_path / "echo.npz", "--channel", "x", "--window-length", "101")
+    asked = run(*call, "--time", "time")
+    assert "or give --time-unit ns" in asked.stderr
+    output = tmp_path / "d.csv"
+    for given in (("--time", "time", "--time-unit", "ns"), ("--delta", "1", "--time-unit", "ms")):
+        done = run(*call, *given, "-o", output)
+        assert done.returncode == 0, done.stderr
+        slopes = recordings.read(output)["derivative_1"]
+        assert np.max(slopes) == pytest.approx(20, rel=0.01)

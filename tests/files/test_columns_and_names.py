@@ -269,3 +269,10 @@ def test_times_that_are_named_in_a_line_of_their_own_keep_their_name(
         found = recordings.read(path)
     assert list(found) == names
     np.testing.assert_array_equal(found[names[0]], np.arange(50) / 1000)
+
+
+def test_names_with_units_are_not_lost_to_words_below_them(tmp_path: Path) -> None:
+    """Channels were called `raw` and `filtered`, without units."""
+    text = "Time [s],Angle [deg],Torque [Nm]\n,raw,filtered\n0,1,2\n1,2,3\n"
+    with pytest.warns(recordings.FileWarning, match="line 2 is not read as names: they are in line 1"):
+        assert list(recordings.read(written(tmp_path, text))) == ["Time [s]", "Angle [deg]", "Torque [Nm]"]

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -81,8 +82,6 @@ def test_nothing_is_said_of_a_record_without_a_fault(rig: tvident.Recording, cal
 def test_a_sign_that_no_machine_has_is_the_verdict(rig: tvident.Recording, call_: dict[str, Any]) -> None:
     found = identified(rig.angle, -rig.torque, **call_)
     assert found.verdict.startswith("do not trust: inertia is negative")
-    import h5py  # noqa: PLC0415 - for this test alone
-
     with h5py.File("out.h5") as file:
         told = json.loads(file.attrs["tvident"])
     assert told["verdict"] == found.verdict
@@ -91,3 +90,14 @@ def test_a_sign_that_no_machine_has_is_the_verdict(rig: tvident.Recording, call_
 def test_every_seventh_row_is_judged_alike(rig: tvident.Recording) -> None:
     found = identified(*joined(rig.angle, rig.torque), step=7, **CONSTANT)
     assert found.verdict.startswith("do not trust: the weak form finds another stiffness")
+
+
+def test_columns_of_a_matrix_have_their_names_and_units(rig: tvident.Recording) -> None:
+    """A list of units was one unit of all, `['s' 'deg' 'N mm']`, and names were numbers."""
+    columns = np.stack([np.asarray(rig.time), np.degrees(rig.angle), 1000 * rig.torque], axis=1)
+    with h5py.File("in.h5", "w") as file:
+        data = file.create_dataset("run/data", data=columns[:20_000])
+        data.attrs["columns"], data.attrs["units"] = ["time", "angle", "torque"], ["s", "deg", "N mm"]
+    found = tvident.identify_file("in.h5", "out.h5", angle="angle", torque="torque")
+    assert found.constants["inertia"][0] == pytest.approx(0.0123, rel=0.02)
+    assert not found.assumed

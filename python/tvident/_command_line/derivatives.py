@@ -8,7 +8,7 @@ import click
 
 from tvident._choices import Loss, RowPolicy, Selection
 from tvident._command_line.group import commands, main
-from tvident._command_line.options import CRITERION, MISSING, PERIOD, RUN, TIME, only_options_from_toml
+from tvident._command_line.options import CRITERION, MISSING, PERIOD, RUN, TIME, TIME_UNIT, only_options_from_toml
 
 
 @main.command(epilog="Example: tvident derivatives rig.csv --channel angle --time time -o derivatives.csv")
@@ -21,6 +21,7 @@ from tvident._command_line.options import CRITERION, MISSING, PERIOD, RUN, TIME,
     help="Samples, odd, a duration such as '0.2 s', or auto: chosen.",
 )
 @TIME
+@TIME_UNIT
 @MISSING
 @click.option("--max-order", type=int, default=15, show_default=True, help="Highest candidate order.")
 @click.option("--order", type=int, help="Fixes the order.")

@@ -41,6 +41,10 @@ def only_options_from_toml(ctx: click.Context, option: click.Parameter, path: st
         )
 
 
+TIME_UNIT = click.option(
+    "--time-unit", metavar="UNIT", help="Unit of the time channel, as ms; by default its header's, or s."
+)
+
 CHANNELS = options_of(
     click.option("--angle", metavar="NAME", help="Channel of the angle, or a file that holds it alone."),
     click.option("--torque", metavar="NAME", help="Channel of the torque, or a file that holds it alone."),
@@ -57,7 +61,7 @@ CHANNELS = options_of(
     click.option(
         "--torque-unit", metavar="UNIT", help="Unit of the torque, as 'N mm'; by default its header's, or N m."
     ),
-    click.option("--time-unit", metavar="UNIT", help="Unit of the time channel, as ms; by default its header's, or s."),
+    TIME_UNIT,
 )
 
 BESIDE = options_of(

@@ -23,7 +23,7 @@ from tvident._commands.output import (
 )
 from tvident._commands.rates import say_other_rate
 from tvident._status import describe
-from tvident._units import derivative_units, named_unit, times_in_seconds, unit_said
+from tvident._units import ROTARY, derivative_units, factor_to, named_unit, times_in_seconds, unit_said
 
 
 # Options that need work before they are passed on are parameters of their own.
@@ -34,6 +34,7 @@ def derivatives(
     sample_rate: float | None,
     delta: float | None,
     time_channel: str | None,
+    time_unit: str | None,
     period: str | None,
     weights: str | None,
     max_gap: str | None,
@@ -49,8 +50,9 @@ def derivatives(
         channel = only_channel(channels, time_channel, file)
     check_has_times("derivatives need", check_time(sample_rate, delta, time_channel), channels, file)
     samples = channel_of(channels, channel, file)
-    say_other_rate(channels, {"sample_rate": sample_rate, "delta": delta, "time_unit": None}, samples.shape, file)
-    times = None if time_channel is None else times_in_seconds(channel_of(channels, time_channel, file))
+    say_other_rate(channels, {"sample_rate": sample_rate, "delta": delta, "time_unit": time_unit}, samples.shape, file)
+    times = None if time_channel is None else times_in_seconds(channel_of(channels, time_channel, file), time_unit)
+    delta = None if delta is None else delta * factor_to(ROTARY, "time", time_unit, name="the time")
     fit = tvident.fit_local_polynomials(
         samples,
         length(window_length),

@@ -196,7 +196,8 @@ class Names:
         rest = [one for one in block if units is None or one[0] is not units[0]]
         named = [one for one in rest if not all(_TYPE.fullmatch(cell) for cell in one[1] if cell)] or rest
         differing = [one for one in named if _differ(one[1])]
-        line, names = (differing or named)[0]
+        # The nearest, but where it names no unit and another one does.
+        line, names = max(differing or named, key=lambda one: units is None and _units_named(one[1]))
         # Several tabs may align a name with its column.
         is_doubtful = self.separator != "\t" or not line.cells[0]
         if is_doubtful and len(line.cells) > self.most and sum(map(bool, line.cells)) == len(names):
@@ -378,6 +379,11 @@ def _share_of_units(cells: Sequence[str]) -> float:
     present = [cell for place, cell in enumerate(cells) if cell and not (place == 0 and _UNITS_KEY.fullmatch(cell))]
     units = [cell for cell in present if is_unit(cell) and (cell.strip("[](){}<> ").isalpha() or len(cell) > 1)]
     return len(units) / len(present) if present else 0.0
+
+
+def _units_named(names: Sequence[str]) -> int:
+    """Return how many names have a unit that is known."""
+    return sum(unit_of(unit) is not None for unit in (named_unit(name)[1] for name in names) if unit)
 
 
 def _completed(names: list[str], others: Sequence[Sequence[str]]) -> list[str]:

@@ -9,6 +9,7 @@ from tvident._arguments import is_called_time
 from tvident._formats.columns import COLUMNS
 from tvident._formats.matlab_tables import has_objects, tables
 from tvident._formats.told import Remark, cut, in_words
+from tvident._formats.trajectories import is_of_modelica, trajectories
 
 
 def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
@@ -18,6 +19,9 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     rest = {
         name: value for name, value in _read(path, skipped).items() if name not in objects and name != "#subsystem#"
     }
+    if is_of_modelica(rest):
+        yield from trajectories(rest, skipped)
+        return
     yield from _flat("", rest, skipped)
     for variable, columns in objects.items():
         prefix = f"{variable}." if len(objects) > 1 or rest else ""

@@ -276,7 +276,12 @@ def _recording(
     if not samples:
         raise ValueError(f"a recording must hold samples; {source.place} has none; check it")
     axis = units_of(angle_says, torque_says, *units)
-    times = [one for one in source.channels if arguments.is_time(*named_unit(one))]
+    named = {one: named_unit(one) for one in source.channels}
+    times = [one for one, (name, unit) in named.items() if arguments.is_time(name, unit)]
+    if not times:
+        # Groups put their names before those of their channels; the times of which group, only one of them says.
+        grouped = [one for one, (name, unit) in named.items() if arguments.is_time(name.rpartition(".")[2], unit)]
+        times = grouped if len(grouped) == 1 else []
     delta, rate = rates
     if delta is not None or rate is not None:
         if names[2] is not None:

@@ -11,9 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._files import TEXT_ENDINGS, FileError, ending_of, full_name, listed, printable, without_marks
-from tvident._units import named_unit
+from tvident._units import named_unit, with_unit
 
 _UNITS = ("unit", "units", "Unit", "Units", "UNITS")
+_COLUMNS = ("columns", "column_names", "channels", "channel_names", "names", "labels")
+"""Attributes that list the columns of a matrix."""
 
 
 class SourceChannel(Protocol):
@@ -215,14 +217,30 @@ def _of_arrays(found: Mapping[str, Any]) -> dict[str, tuple[SourceChannel, int]]
         if array.dtype.kind not in "iuf" or not array.shape:
             continue
         said = next((array.attrs[one] for one in _UNITS if one in array.attrs), "")
-        unit = said.decode(errors="replace") if isinstance(said, bytes) else str(said)
-        ending = f" [{unit}]" if unit else ""
+        units = [_text(one) for one in np.ravel(said).tolist()]
         if array.ndim == 1:
-            channels[(name or "0") + ending] = (_OfArray(array), array.shape[0])
+            channels[with_unit(name or "0", units[0] if len(units) == 1 else "")] = (_OfArray(array), array.shape[0])
         elif array.ndim == 2:  # noqa: PLR2004 - samples and channels
-            for column in range(array.shape[1]):
-                channels[f"{name}.{column}".lstrip(".") + ending] = (_OfArray(array, column), array.shape[0])
+            count = array.shape[1]
+            units = units if len(units) == count else units[:1] * count if len(units) == 1 else [""] * count
+            names = _names_of_columns(array)
+            for column, (called, unit) in enumerate(zip(names, units, strict=True)):
+                channels[with_unit(f"{name}.{called}".lstrip("."), unit)] = (_OfArray(array, column), array.shape[0])
     return channels
+
+
+def _names_of_columns(array: Any) -> list[str]:
+    """Return the names of the columns of a matrix, as an attribute of it lists them, or their numbers."""
+    count = array.shape[1]
+    for key in _COLUMNS:
+        names = [_text(one) for one in np.ravel(array.attrs.get(key, ())).tolist()]
+        if len(set(names)) == count and all(names):
+            return names
+    return list(map(str, range(count)))
+
+
+def _text(one: object) -> str:
+    return one.decode(errors="replace") if isinstance(one, bytes) else str(one)
 
 
 def _source(

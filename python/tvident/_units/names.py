@@ -48,7 +48,7 @@ _OF_TURNS = re.compile(
     r"(.*(?:angle|position|rotation|theta|phi|winkel).*?)[_\s]+(turns|revs|revolutions|rev)", re.IGNORECASE | re.DOTALL
 )
 """Turns that an angle is in; ``rev`` alone may mean another thing, and is asked for."""
-_TURNS = {"turns": "turns", "revs": "revs", "revolutions": "revolutions", "rev": "_rev"}
+_TURNS = {"turns": "turns", "revs": "revs", "revolutions": "revolutions", "rev": "rev?"}
 _TORQUES = {"nm": "Nm", "nmm": "Nmm", "mnm": "mNm", "knm": "kNm"}
 
 

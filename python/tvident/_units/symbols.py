@@ -130,7 +130,7 @@ DOUBTFUL = {
     "Mm": "mm with a capital, megametres as written",
     "Mrad": "mrad with a capital, megaradians as written",
     "MNm": "mNm with a capital, MN m as written",
-    "_rev": "rev for revolutions, or a name that says reversed",
+    "rev?": "rev for revolutions, or a name that says reversed",
 }
 """Units in letters that mean two things, of which hardly anybody measures the one that is written, and what they mean."""
 
