@@ -7,13 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from tvident._formats.groups import Group, named
-from tvident._formats.told import cut, in_words
+from tvident._formats.told import Remark, cut, in_words
 
 _JOINTS = "sensor_msgs/msg/JointState"
 _QUANTITIES = ("position", "velocity", "effort")
 
 _ZSTD = b"\x28\xb5\x2f\xfd"
 """How what Zstandard compressed begins."""
+
+_NEARLY_ALL = 0.9
+"""Part of a topic's messages that have a field which the others lack."""
 
 _MOST_ELEMENTS = 64
 """Of an array in a message: more is a picture or a cloud of points."""
@@ -47,6 +50,10 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
         if topic in read:
             groups += topic.groups(first)
             skipped += [f"{cut(topic.name)}.{cut(name)} ({why})" for name, why in topic.left_out.items()]
+            skipped += [
+                Remark(f"{cut(topic.name)}.{cut(name)} is not in {count} messages of its topic: missing values")
+                for name, count in topic.gaps.items()
+            ]
         else:
             skipped.append(f"{cut(topic.name)} ({topic.failed or 'no numbers'})")
     yield from named(groups, skipped)
@@ -61,6 +68,8 @@ class _Topic:
         """Stamps in nanoseconds and values by name."""
         self.left_out: dict[str, str] = {}
         """Fields that are not read, and why."""
+        self.gaps: dict[str, int] = {}
+        """Messages that lack a field which the others have."""
 
     def add(self, message: Any, received: int) -> None:
         stamp = getattr(getattr(message, "header", None), "stamp", None)
@@ -79,14 +88,30 @@ class _Topic:
         import numpy as np  # noqa: PLC0415 - within the limits
 
         found: dict[bytes, Group] = {}
+        longest = np.asarray(max((one for one, _ in self.columns.values()), key=len, default=[]), dtype=np.int64)
         for name, (stamps, values) in self.columns.items():
-            exact = np.asarray(stamps, dtype=np.int64)
+            exact, samples = np.asarray(stamps, dtype=np.int64), np.asarray(values)
+            if _is_nearly_all(exact, longest):
+                # A few messages lack it: its samples are missing there, and its clock is that of the others.
+                self.gaps[name] = longest.size - exact.size
+                places, samples = np.searchsorted(longest, exact), np.full(longest.size, np.nan)
+                samples[places] = values
+                exact = longest
             key = exact.tobytes()
             if key not in found:
                 count = f"_{len(found)}" if found else ""
                 found[key] = Group(f"{self.name}{count}", (exact - first) / 1e9)
-            found[key].channels.append((name, "", np.asarray(values)))
+            found[key].channels.append((name, "", samples))
         return list(found.values())
+
+
+def _is_nearly_all(stamps: Any, longest: Any) -> bool:
+    """Return whether stamps are some of others that increase, and hardly any are missing."""
+    import numpy as np  # noqa: PLC0415 - within the limits
+
+    if not _NEARLY_ALL * longest.size <= stamps.size < longest.size or not (np.diff(longest) > 0).all():
+        return False
+    return bool((np.diff(stamps) > 0).all() and np.isin(stamps, longest).all())
 
 
 def _of_joints(message: Any) -> Iterator[tuple[str, float]]:
