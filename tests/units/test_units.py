@@ -363,3 +363,22 @@ def test_a_unit_that_is_long_makes_no_long_message() -> None:
     with pytest.raises(ValueError, match="same quantity") as refused:
         Channel(np.zeros(3), "x" * 5000).to("rad")
     assert len(str(refused.value)) < 200
+
+
+@pytest.mark.parametrize(
+    ("name", "bare", "unit", "factor"),
+    [
+        ("torque_pct", "torque", "%", None),
+        ("Target Torque percent", "Target Torque", "%", None),
+        ("\u30c8\u30eb\u30af[N\u30fbm]", "\u30c8\u30eb\u30af", "N\u30fbm", 1.0),
+        ("\u00c1ngulo [grados]", "\u00c1ngulo", "grados", np.pi / 180),
+        ("Hoek (graden)", "Hoek", "graden", np.pi / 180),
+    ],
+)
+def test_units_of_other_languages_and_percentages(name: str, bare: str, unit: str, factor: float | None) -> None:
+    """`torque_pct` was N m: an inertia of 1.23 for .0123; the others were refused as unknown."""
+    assert named_unit(name) == (bare, unit)
+    found = unit_of(unit)
+    assert found is not None
+    if factor is not None:
+        assert found.factor == pytest.approx(factor)

@@ -42,14 +42,16 @@ _TIMES = {"millis": "ms", "micros": "us", "nanos": "ns"}
 """What Arduino calls its times."""
 _BEHIND_A_WORD = re.compile(r"(.*[a-z])(Deg|Degrees|Rad|Radians|MRad|Nm|Nmm|Ms|Msec|Sec)")
 """The same at the end of a name that capitals divide into words."""
-_OF_TORQUES = re.compile(r"(.*(?:torque|moment|effort|tau).*?)[_\s]+(nmm?|mnm|knm)", re.IGNORECASE | re.DOTALL)
+_OF_TORQUES = re.compile(
+    r"(.*(?:torque|moment|effort|tau).*?)[_\s]+(nmm?|mnm|knm|pct|percent)", re.IGNORECASE | re.DOTALL
+)
 """Units that would be lengths elsewhere."""
 _OF_TURNS = re.compile(
     r"(.*(?:angle|position|rotation|theta|phi|winkel).*?)[_\s]+(turns|revs|revolutions|rev)", re.IGNORECASE | re.DOTALL
 )
 """Turns that an angle is in; ``rev`` alone may mean another thing, and is asked for."""
 _TURNS = {"turns": "turns", "revs": "revs", "revolutions": "revolutions", "rev": "rev?"}
-_TORQUES = {"nm": "Nm", "nmm": "Nmm", "mnm": "mNm", "knm": "kNm"}
+_TORQUES = {"pct": "%", "percent": "%", "nm": "Nm", "nmm": "Nmm", "mnm": "mNm", "knm": "kNm"}
 
 
 _OF_CURRENTS = re.compile(

@@ -23,7 +23,20 @@ _LONGEST_TEXT = 60
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _RAISED = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+")
 _SAME = str.maketrans(
-    {"µ": "u", "μ": "u", "·": " ", "⋅": " ", "∙": " ", "•": " ", "\u00d7": " ", "*": " ", "º": "°", "˚": "°"}
+    {
+        "µ": "u",
+        "μ": "u",
+        "·": " ",
+        "⋅": " ",
+        "∙": " ",
+        "•": " ",
+        "\u30fb": " ",
+        "\uff65": " ",
+        "\u00d7": " ",
+        "*": " ",
+        "º": "°",
+        "˚": "°",
+    }
     | dict.fromkeys("\u2010\u2011\u2012\u2013\u2212", "-")
 )
 
@@ -34,6 +47,9 @@ _ONE_OVER = re.compile(r"1\s*/\s*")
 _BETWEEN = re.compile(r"\s*([/.]|-(?=[A-Za-z]))?\s*")
 
 _BRACKETS = {"[": "]", "(": ")", "{": "}", "<": ">"}
+_DEGREES = frozenset(("grados", "graden", "gradi", "grader", "graus"))
+"""What degrees are called where nobody calls gon so."""
+
 _NO_UNIT = frozenset(("", "-", "--", "1", "none", "n/a", "a.u.", "[]", "()"))
 
 
@@ -72,6 +88,8 @@ def unit_of(text: str) -> Unit | None:
     plain = _POWER.sub("^", plain.removesuffix(".").removesuffix("(s)"))
     if plain in DOUBTFUL:
         return None  # asked for
+    if plain.lower() in _DEGREES:
+        return _product("deg")
     if "grad" in plain.lower():
         return None  # degrees in German, gon in French, and no gram
     speed = ROTATIONS.get(plain.lower().replace(".", ""))
