@@ -26,6 +26,7 @@ from tvident._advice.instrument import fed_back
 from tvident._advice.lag import untold_lag
 from tvident._advice.scales import disagreement, scales_compared
 from tvident._advice.torque import OF_TORQUE, told_by_torque
+from tvident._advice.undescribed import drives, driving
 from tvident._arguments import listed
 from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, UNITS
 from tvident._results import NOT_CONSTANT, Words
@@ -134,7 +135,14 @@ class Explained:
         # Where unknowns are collinear the rest may follow from it. Else what can be typed comes before what is to be looked for.
         return Words(
             reasons,
-            (*self._defects(), *collinear(self.found, self.names), *self._of_torque(), *self.suspicions(), *advice),
+            (
+                *self._defects(),
+                *collinear(self.found, self.names),
+                *self._of_torque(),
+                *self.suspicions(),
+                *driving(self._conspicuous(), self.units),
+                *advice,
+            ),
         )
 
     def _constants(self) -> list[tuple[str, _core.Unknown]]:
@@ -327,7 +335,7 @@ class Explained:
     def suspects(self) -> list[Any]:
         """What seems to be missing, the surest first; friction that drives the motion is no friction."""
         found = [one for one in self._conspicuous() if one.name not in OF_TORQUE]
-        return [one for one in found if one.value > 0 or one.name == "lag" or not BUILT_IN[one.name].dissipates]
+        return [one for one in found if not drives(one)]
 
     def _conspicuous(self) -> list[Any]:
         """Return what is beyond chance, the surest first."""

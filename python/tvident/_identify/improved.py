@@ -11,6 +11,7 @@ import numpy as np
 
 from tvident import _core
 from tvident._advice import NOT_DISTINGUISHED, Explained
+from tvident._advice.undescribed import in_vain
 from tvident._arguments import percent
 from tvident._clocks import bridged
 from tvident._equation import BUILT_IN, COEFFICIENTS, FRICTION, OFFSET, Unknown
@@ -300,6 +301,9 @@ class Improvement(_AskedOfRecord):
             words = self._without_worse_offset(result, words)
         useless, given_well = ([], []) if advice is not None else trial.useless()
         dropped = self._explained.suspicions(suspects if advice is not None else useless)
+        if advice is None:
+            # Flags stay, and so does what they say.
+            words = replace(words, advice=(*in_vain(self._explained.suspects, useless), *words.advice))
         starts = tuple(f"{name} was given as constant" for name in given_well)
         hidden = (
             self._explained.words().advice
