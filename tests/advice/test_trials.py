@@ -168,7 +168,14 @@ def test_a_lag_most_of_which_is_gone_beside_friction_is_none(left: float, error:
         return SimpleNamespace(settings={"lag": left} | ({} if error is None else {"lag_stderr": error}))
 
     kinds = {"inertia": "constant", "damping": "varying", "stiffness": "windowed", "offset": "windowed"}
-    settings = {"kinds": kinds, "lag": 1.0, "window_length": 21, "exponent": 9, "regression_window": 84}
+    settings = {
+        "kinds": kinds,
+        "lag": 1.0,
+        "window_length": 21,
+        "exponent": 9,
+        "regression_window": 84,
+        "sample_rate": 1.0,
+    }
     found: Any = SimpleNamespace(settings=settings)
     trial = Trial(identify, found, AUTOMATIC, ["offset"], ["lag"])
     assert trial._is_late(found) == is_late  # noqa: SLF001 - what is tried is the test
@@ -176,3 +183,20 @@ def test_a_lag_most_of_which_is_gone_beside_friction_is_none(left: float, error:
     lengths = {name: settings[name] for name in ("window_length", "exponent", "regression_window")}
     expected = {"inertia": "constant", "damping": "auto", "stiffness": "windowed"}
     assert asked == [{**expected, "terms": terms, "lag": "auto", **lengths}]
+
+
+@pytest.mark.parametrize("moved", ["", ", damping becomes 0.4"])
+def test_a_lag_of_next_to_nothing_is_told_where_it_moves_something(moved: str) -> None:
+    """What sums over samples leave of integrals looks like a lag of thousandths of a sample: without noise it is beyond chance."""
+
+    class Moving(Trial):
+        def _moved(self, *_: object, **__: object) -> str:
+            return moved
+
+    def identify(**_: Any) -> Any:
+        return SimpleNamespace(settings={"lag": 1e-6, "lag_stderr": 1e-9})
+
+    kinds = {"inertia": "constant", "damping": "constant", "stiffness": "constant"}
+    settings = {"kinds": kinds, "lag": 1e-6, "window_length": 21, "exponent": 9, "sample_rate": 1000.0}
+    found: Any = SimpleNamespace(settings=settings)
+    assert Moving(identify, found, AUTOMATIC, [], ["lag"])._is_late(found) == bool(moved)  # noqa: SLF001 - as above

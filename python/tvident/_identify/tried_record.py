@@ -34,6 +34,9 @@ CONTRADICTED = LEFT_OVER | Status.SCALES_DISAGREE | Status.KIND_CONTRADICTED
 _APART, _KNOWN, _MOSTLY = 4.0, 0.1, 0.9
 """A parameter stays what it is where it is so many errors away, these are at most such a part of it, and both at so many of the samples."""
 
+_LEAST_LAG = 0.02
+"""A lag of so few samples is told only where it moves a parameter, as in the core."""
+
 _MOST_OF_LAG = 0.5
 """A lag stays what it is where so much of it is left beside what resists the motion."""
 
@@ -117,10 +120,15 @@ class TriedRecord:
         return "lag" not in names or self._is_late(found)
 
     def _is_late(self, found: Identification) -> bool:
-        """Return whether the lag of a result is about the same beside what resists the motion.
+        """Return whether the lag of a result is worth a word, and about the same beside what resists the motion.
 
-        Friction that is smooth looks like one: most of such a lag is gone beside dry friction and drag, which hardly change a true one.
+        Sums over samples leave something of integrals, which looks like a lag of next to nothing. Friction that is smooth looks like one:
+        most of such a lag is gone beside dry friction and drag, which hardly change a true one.
         """
+        if abs(found.settings["lag"]) * found.settings["sample_rate"] < _LEAST_LAG and not self._moved(
+            found, is_more=False
+        ):
+            return False
         kinds = found.settings["kinds"]
         resisting = [name for name, one in BUILT_IN.items() if one.dissipates and not one.inner and name not in kinds]
         if not resisting:

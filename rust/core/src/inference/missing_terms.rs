@@ -120,8 +120,8 @@ pub(crate) type FactorsAndChanges = (Vec<(f64, f64)>, Vec<f64>);
 
 /// What every row adds to a coefficient, over its right-hand side, and what is left of the row beside it.
 pub(crate) struct InRows {
-    by: Vec<f64>,
-    left: Vec<f64>,
+    pub(crate) by: Vec<f64>,
+    pub(crate) left: Vec<f64>,
 }
 
 impl InRows {
@@ -129,16 +129,11 @@ impl InRows {
     pub(crate) fn error_of_blocks(&self) -> f64 {
         of_blocks(&self.by, &self.left, self.by.len().div_ceil(BLOCKS))
     }
-
-    /// The root of the summed squares of the parts that blocks of so many rows have in a coefficient, whose column comes with it: one where a single one
-    /// tells it.
-    pub(crate) fn shares_of_blocks(&self, column: &[f64], rows: usize) -> f64 {
-        of_blocks(&self.by, column, rows)
-    }
 }
 
-/// The root of the summed squares of the products of two columns, block by block.
-fn of_blocks(one: &[f64], other: &[f64], rows: usize) -> f64 {
+/// The root of the summed squares of the products of two columns, summed in blocks of so many rows: of what rows move a coefficient by and its own column
+/// one where a single block tells it.
+pub(crate) fn of_blocks(one: &[f64], other: &[f64], rows: usize) -> f64 {
     let products: Vec<f64> = one.iter().zip(other).map(|(one, other)| one * other).collect();
     products.chunks(rows.max(1)).map(|block| block.iter().sum::<f64>().powi(2)).sum::<f64>().sqrt()
 }
@@ -312,9 +307,9 @@ mod tests {
                 // Each block has the same share, and 32 tell their scatter to an eighth.
                 let expected = of_noise.hypot(apart / (BLOCKS as f64).sqrt());
                 assert!((told.error_of_blocks() / expected - 1.0).abs() < 0.5, "{} {expected}", told.error_of_blocks());
-                let shares = told.shares_of_blocks(&rows.regressors[3].value, block);
+                let shares = of_blocks(&told.by, &rows.regressors[3].value, block);
                 assert!((shares * (BLOCKS as f64).sqrt() - 1.0).abs() < 0.5, "{shares}");
-                let one = told.shares_of_blocks(&rows.regressors[3].value, ROWS);
+                let one = of_blocks(&told.by, &rows.regressors[3].value, ROWS);
                 assert!((one - 1.0).abs() < 1e-9, "{one}");
             });
         }

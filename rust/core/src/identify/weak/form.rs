@@ -16,7 +16,7 @@ use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decide::BADLY;
 use crate::identify::weak::found::WeakIdentified;
 use crate::identify::weak::friction::FrictionDirection;
-use crate::identify::weak::lag::Settled;
+use crate::identify::weak::lag::{Lag, Settled};
 use crate::identify::weak::limits;
 use crate::identify::weak::options::WeakOptions;
 use crate::identify::weak::pulses::{add_pulses, allow_hidden, are_the_same, without_pulses};
@@ -386,7 +386,7 @@ impl Session<'_, '_, '_> {
             }
             found.results = at_rows.at_samples(samples, self.options.step, &mut self.stages)?;
         }
-        found.lag = lag;
+        found.lag = lag.map(|one| Lag { error: one.error.hypot(found.lag_of_steps), ..one });
         Ok(found)
     }
 }

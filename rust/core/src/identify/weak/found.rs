@@ -55,6 +55,8 @@ pub(crate) struct WeakIdentified {
     pub(crate) lag: Option<Lag>,
     /// Samples of it that are not told beyond its error beside what the equations hold: the search for it did not settle.
     pub(crate) untold_lag: f64,
+    /// Samples by which a lag that was found may be wrong since steps of the torque may lie anywhere between two samples.
+    pub(crate) lag_of_steps: f64,
     /// Which channel is filtered by more than the lag explains, and by which part of them constants may be wrong by that, if one is.
     pub(crate) filtered: Option<(usize, f64)>,
     /// The angle at which the spring is relaxed, or `None` if it was not needed.

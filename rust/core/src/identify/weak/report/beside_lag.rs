@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::lag::{Followed, UNKNOWN};
+use crate::identify::weak::report::doubted::StepRows;
 use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::session::Session;
 use crate::regression::fit::Fit;
@@ -15,6 +16,9 @@ pub(crate) struct BesideLag {
     pub(crate) covariance: Vec<f64>,
     /// What all of them change by with what is not told of the lag; nothing where it is told.
     pub(crate) untold: Option<Vec<f64>>,
+    /// Samples by which a lag that was found may be wrong since steps of the torque may lie anywhere between two of them: what it is then is the lag of
+    /// this torque, beside which all else is right.
+    pub(crate) of_steps: f64,
 }
 
 /// Samples of a lag that are not told, up to where its rate is no line any more.
@@ -32,11 +36,11 @@ impl Session<'_, '_, '_> {
         (fit, all): (&Fit, &Fit),
         errors: &Errors,
     ) -> Result<BesideLag, Error> {
-        let mut found = match self.beside_lag(problem, weak, decided, fit, errors)? {
-            Some(found) => found,
-            None => {
-                BesideLag { covariance: all.covariance(problem, &errors.covariance, &mut self.stages)?, untold: None }
-            }
+        let mut found = if let Some(found) = self.beside_lag(problem, weak, decided, fit, errors)? {
+            found
+        } else {
+            let covariance = all.covariance(problem, &errors.covariance, &mut self.stages)?;
+            BesideLag { covariance, untold: None, of_steps: 0.0 }
         };
         for entry in &mut found.covariance {
             *entry *= errors.inflation;
@@ -69,6 +73,10 @@ impl Session<'_, '_, '_> {
             return Ok(None);
         };
         let both = all.covariance(&problem, &errors.covariance, &mut self.stages)?;
+        let moved = all.moved_by_rows(&problem, wanted..wanted + 1, &mut self.stages)?.swap_remove(0);
+        let rate_column = Some(rows.regressors[rate].value.as_slice());
+        let steps = self.by_steps(&moved, StepRows { weak, rate: rate_column, are_white: decided.white.is_some() });
+        let of_steps = steps / self.options.delta;
         // What varies slowly follows the lag, too.
         let count = wanted + 1;
         let follows = |one: usize| by.get(one).copied().unwrap_or(0.0);
@@ -82,6 +90,6 @@ impl Session<'_, '_, '_> {
         let change = |one: usize| seconds * (with_rate[one] / with_rate[wanted] - follows(one));
         let changes: Vec<f64> = (0..wanted).map(change).collect();
         let untold = Some(changes).filter(|all| seconds > 0.0 && all.iter().all(|one| one.is_finite()));
-        Ok(Some(BesideLag { covariance, untold }))
+        Ok(Some(BesideLag { covariance, untold, of_steps }))
     }
 }

@@ -8,7 +8,7 @@ use crate::equation::terms::BUILT_IN_TERMS;
 use crate::error::Error;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::lag::Followed;
-use crate::identify::weak::report::doubted::Doubted;
+use crate::identify::weak::report::doubted::{Doubted, StepRows};
 use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::session::Session;
 use crate::inference::missing_terms::{CONSPICUOUS, JudgedTerm, Missing, Suspect};
@@ -21,6 +21,11 @@ use crate::weak_form::weak_rows::{Record, TermSamples, WeakRows, mean};
 
 /// Where next to nothing is left to explain, a lag is none that is below a fifth of what a drive makes that holds each torque for a sample.
 const LEAST_LAG: f64 = 0.1;
+
+/// A lag of so few samples is told only where a parameter changes by this part of it: both channels of a recorder are a hundredth of a sample apart, sums
+/// over samples leave as much of integrals, and errors hold it.
+const LEAST_TOLD: f64 = 0.02;
+const LEAST_CHANGE: f64 = 0.01;
 
 /// Standard errors from which on a term or a lag may be there, though it is not worth a word yet: little friction is much of a damping beside it.
 const MAY_BE_THERE: f64 = 3.0;
@@ -124,7 +129,8 @@ impl Session<'_, '_, '_> {
             decided.model.correlated(&weak.rows, &errors.covariance, &mut self.stages)?
         };
         let (mut with_lag, mut changes, unknowns) = (Vec::new(), Changes::default(), self.unknowns());
-        let (resisting, reach) = (of_velocity(&candidates, &followed, first), weak.reach());
+        let resisting = of_velocity(&candidates, &followed, first);
+        let steps = step_rows(&weak, (&candidates, first), decided);
         for (place, missing) in candidates.iter().enumerate().filter(|(_, missing)| !missing.is_of_torque()) {
             let is_lag = *missing == Missing::Lag;
             let Some(follows) = &followed[place] else { continue };
@@ -160,8 +166,13 @@ impl Session<'_, '_, '_> {
                 let each = decided.ordered().constant.into_iter().zip(by_one.iter().map(|one| one / unit));
                 with_lag = each.filter(|(one, _)| unknowns.contains(one)).collect();
             }
-            changes.add(suspect, by_one.into_iter().map(|one| value * one).collect());
-            let doubted = Doubted { suspect, regressors: &regressors, unit, reach };
+            let by_suspect: Vec<f64> = by_one.into_iter().map(|one| value * one).collect();
+            let is_told = !is_lag || suspect.value.abs() >= LEAST_TOLD || matters(&by_suspect, fit, decided);
+            changes.add(suspect, by_suspect);
+            if !is_told {
+                continue;
+            }
+            let doubted = Doubted { suspect, regressors: &regressors, unit, rows: steps };
             let suspect = match suspect.is_conspicuous() {
                 true if is_lag => self.agreed_lag(&judged, doubted, &resisting)?,
                 true => self.agreed(&judged, doubted)?,
@@ -288,6 +299,31 @@ impl Session<'_, '_, '_> {
         all.sort_by_key(Missing::is_beside_torque);
         all
     }
+}
+
+/// Whether constants or what varies slowly change by a part that matters with a lag.
+fn matters(changes: &[f64], fit: &Fit, decided: &Decided) -> bool {
+    let slow = decided.found.iter().flat_map(|found| &found.varying.values).map(|values| mean_size(values));
+    let sizes = slow.chain(fit.pooled.values.iter().map(|value| value.abs()));
+    let each = decided.ordered().constant.into_iter().zip(sizes).zip(changes);
+    each.into_iter().any(|((unknown, size), change)| unknown < 3 && change.abs() > LEAST_CHANGE * size)
+}
+
+fn mean_size(values: &[f64]) -> f64 {
+    let sizes = values.iter().map(|value| value.abs()).filter(|size| size.is_finite());
+    let (count, sum) = sizes.fold((0.0, 0.0), |(count, sum), size| (count + 1.0, sum + size));
+    sum / count
+}
+
+/// The rows that are judged by, and what steps of the torque move them by.
+pub(crate) fn step_rows<'a>(
+    weak: &'a WeakRows,
+    (candidates, first): (&[Missing], usize),
+    decided: &Decided,
+) -> StepRows<'a> {
+    let rate = candidates.iter().position(|&one| one == Missing::Lag);
+    let column = |place: usize| weak.rows.regressors[first + place].value.as_slice();
+    StepRows { weak, rate: rate.map(column), are_white: decided.white.is_some() }
 }
 
 /// The regressors of terms of the velocity, and of what follows them.

@@ -10,8 +10,9 @@ use crate::error::Error;
 use crate::identify::scanned::OTHER_CONSTANT;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::report::filter::{UNSURE, shared_noise};
+use crate::identify::weak::report::missing_terms::step_rows;
 use crate::identify::weak::session::Session;
-use crate::inference::missing_terms::{Missing, Suspect};
+use crate::inference::missing_terms::{InRows, Missing, Suspect};
 use crate::regression::fit::Fit;
 use crate::regression::limits::{NEGLIGIBLE, NOISE_MODEL_FAILS};
 use crate::regression::model::Model;
@@ -121,6 +122,7 @@ impl Session<'_, '_, '_> {
         let noise = expected.torque.min(covariance.variance());
         let shared = shared(weak, &regressors, candidates, (noise, self.torque_zero()));
         let lag = candidates.iter().position(|&one| one == Missing::Lag);
+        let steps = step_rows(weak, (candidates, regressors.start), decided);
         let mut suspects = Vec::new();
         for (place, &missing) in candidates.iter().enumerate().filter(|(_, missing)| missing.is_of_torque()) {
             let value = beside.pooled.values[count + place];
@@ -132,6 +134,13 @@ impl Session<'_, '_, '_> {
             }
             let variance = beside.variance_of(&problem, count + place, &covariance, &mut self.stages)?;
             let mut suspect = Suspect { missing, value, error: variance.sqrt() };
+            if suspect.is_conspicuous() {
+                let mut by = beside.moved_by_rows(&problem, count + place..count + place + 1, &mut self.stages)?;
+                let told = InRows { by: by.swap_remove(0), left: left.clone() };
+                let spread = if missing == Missing::Resonance { self.spread_of_steps() } else { 0.0 };
+                suspect.error =
+                    suspect.error.max(told.error_of_blocks()).hypot(self.by_steps(&told.by, steps)) + spread;
+            }
             if suspect.is_conspicuous() {
                 // The torque's noise is in both sides.
                 let white = beside.covariance(&problem, &RowCovariance::white(), &mut self.stages)?;

@@ -13,7 +13,7 @@ use crate::identify::weak::found::WeakIdentified;
 use crate::identify::weak::lag::Lag;
 use crate::identify::weak::outside_mask::Inside;
 use crate::identify::weak::report::at_rows::{Fitted, OfAllRows};
-use crate::identify::weak::report::beside_lag::{BesideLag, untold_lag};
+use crate::identify::weak::report::beside_lag::untold_lag;
 use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::report::explained::Explained;
 use crate::identify::weak::report::filter::{LEAST_CHANGE, LeftOfFilter};
@@ -55,13 +55,13 @@ impl Session<'_, '_, '_> {
         let problem = ordered.problem(rows, decided.rhs(rows), self.noise[0], Some(&correlated));
         let all = self.all_unknowns(&problem, decided, fit, &errors)?;
         let Some(all) = all.as_deref() else { return Ok((self.undetermined(found, decided)?, None)) };
-        found.condition = all.pooled.condition;
-        found.weakest = weakest(&all.full, &all.pooled.weights);
-        let BesideLag { covariance, untold } = self.covariance_of(&problem, &weak, decided, (fit, all), &errors)?;
+        (found.condition, found.weakest) = (all.pooled.condition, weakest(&all.full, &all.pooled.weights));
+        let beside = self.covariance_of(&problem, &weak, decided, (fit, all), &errors)?;
+        found.lag_of_steps = beside.of_steps;
         let left = self.left_of_filter(&weak, decided, fit, &errors)?;
-        let mut changes = changes_of(untold.as_deref(), left.as_ref());
+        let mut changes = changes_of(beside.untold.as_deref(), left.as_ref());
         let first = changes.len();
-        found.covariance = with_changes(covariance, &changes);
+        found.covariance = with_changes(beside.covariance, &changes);
 
         let (slow, count) = (decided.slow.len(), ordered.constant.len());
         let mut values = vec![0.0; slow];
@@ -179,6 +179,7 @@ impl Session<'_, '_, '_> {
             suspects: Vec::new(),
             lag: None,
             untold_lag: untold_lag(decided, weak),
+            lag_of_steps: 0.0,
             filtered: None,
             angle_zero: None,
             free_offset: self.free_offset,
