@@ -1,4 +1,4 @@
-"""What seems to act and is none of the known terms, in words."""
+"""What seems to act and is none of the known terms, or nothing at all, in words."""
 
 from __future__ import annotations
 
@@ -13,6 +13,11 @@ UNDESCRIBED = "something seems to act that none of the known terms describes"
 _CURE = (
     "give a term of your own (tvident.Term) if you know what it is, as friction that grows less than the velocity does, or mask the "
     "samples at which it acts"
+)
+
+UNTOLD = (
+    "what is left looks like a lag of the torque, but the record does not tell it from what changes: give lag='auto' to have errors hold "
+    "whatever it is; if both channels are sampled at the same time, nothing need be done"
 )
 
 
@@ -53,6 +58,12 @@ def in_vain(suspects: Sequence[_core.Suspect], tried: Collection[str]) -> list[s
         return []
     alike = listed([_meaning(one.name) for one in suspects])
     return [f"{UNDESCRIBED}: what is left goes as {alike}, but with that nothing more is predicted; {_CURE}"]
+
+
+def none_there(name: str, amount: str) -> str:
+    """Return that a suspect is none, of which so much is found with it in the equation."""
+    said = f"what is left looks like {_meaning(name)}, but is none: with it in the equation it is {amount}"
+    return f"{said}; errors hold what it would change"
 
 
 def _meaning(name: str) -> str:

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from tvident._arguments import percent
+from tvident import _core
+from tvident._advice.undescribed import UNTOLD, none_there
+from tvident._arguments import percent, with_error
 from tvident._equation import COEFFICIENTS
 from tvident._identify.first_look import FirstLook
 from tvident._identify.left_over import AS_GOOD, Left
@@ -31,6 +33,10 @@ _NARROWER = (4, 2)
 
 _SHORTEST = 9
 """Samples that a test function has at least."""
+
+_BY_CHANCE = 2.0
+_LEAST_PART = 0.5
+"""A suspect is none where it is less than such a part of what it seemed to be, by so many errors."""
 
 _FAR_SMALLER = 1 / 3
 """What predicts as much is advised where an error falls to this part or below."""
@@ -90,6 +96,40 @@ class BesideChanges(TriedRecord):
         is_explained = self.result.record_status & Status.NOISE_MODEL and not result.record_status & CONTRADICTED
         return bool(is_explained) and names == tuple(self._seen_beside_changes)
 
+    def denied(self, suspects: Sequence[_core.Suspect]) -> dict[str, str]:
+        """Return suspects that are not there where they are tried with all else as it was asked for, each with what is to be said.
+
+        What the core suspects is told by equations at hand, whose windows and curves follow what else is wrong with them.
+        """
+        tried = self._beside.get(1 if self._may_change else 0, {})
+        words = {}
+        for one in suspects:
+            found = tried.get((one.name,))
+            if found is None:
+                continue
+            value, error = self._amount(one.name, found)
+            if error is None:
+                words[one.name] = UNTOLD
+            elif abs(value) + _BY_CHANCE * error < _LEAST_PART * abs(one.value):
+                unit = "samples" if one.name == "lag" else found.units.get(one.name, "")
+                words[one.name] = none_there(one.name, f"{with_error(value, error)} {unit}")
+        return words
+
+    @staticmethod
+    def _amount(name: str, found: Identification) -> tuple[float, float | None]:
+        """Return what was found of a term or a lag, in samples, and its error; None where it is not determined."""
+        if name != "lag":
+            value, error, *_ = found.value(name)
+            return value, error
+        rate, of_lag = found.settings["sample_rate"], found.settings.get("lag_stderr")
+        return found.settings["lag"] * rate, None if of_lag is None else of_lag * rate
+
+    @property
+    def _may_change(self) -> bool:
+        """Whether inertia or damping was found to vary, and might have been constant."""
+        found, constant = self.result.settings["kinds"], self._beside_constants
+        return any(found[name] == "varying" and constant[name] != self.given[name] for name in COEFFICIENTS)
+
     def _each_beside_changes(self) -> Iterator[dict[Names, Identification]]:
         """Yield what suspects make of the record: beside constants and stiffness as it was asked for, then as all was asked for.
 
@@ -100,9 +140,7 @@ class BesideChanges(TriedRecord):
         """
         call = self._of_constants_alone
         constant = self._beside_constants
-        found = self.result.settings["kinds"]
-        may_change = any(found[name] == "varying" and constant[name] != self.given[name] for name in COEFFICIENTS)
-        for place, kinds in enumerate([constant, self.given] if may_change else [constant]):
+        for place, kinds in enumerate([constant, self.given] if self._may_change else [constant]):
             if place and self._needs_no_changes:
                 return
             if place not in self._beside:

@@ -300,10 +300,13 @@ class Improvement(_AskedOfRecord):
             # Beside other advice this comes later.
             words = self._without_worse_offset(result, words)
         useless, given_well = ([], []) if advice is not None else trial.useless()
-        dropped = self._explained.suspicions(suspects if advice is not None else useless)
+        conspicuous = self._explained.suspects
+        denied = {} if advice is not None else trial.denied(conspicuous)
+        dropped = self._explained.suspicions(suspects if advice is not None else [*useless, *denied])
         if advice is None:
             # Flags stay, and so does what they say.
-            words = replace(words, advice=(*in_vain(self._explained.suspects, useless), *words.advice))
+            left = [one for one in conspicuous if one.name not in denied]
+            words = replace(words, advice=(*in_vain(left, useless), *denied.values(), *words.advice))
         starts = tuple(f"{name} was given as constant" for name in given_well)
         hidden = (
             self._explained.words().advice
