@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tvident._advice.undescribed import UNTOLD
+from tvident._advice.undescribed import LAG_NOT_TOLD
 from tvident._identify.remedies import Trial
 
 GIVEN = {"inertia": "auto", "damping": "auto", "stiffness": "windowed"}
@@ -45,7 +45,7 @@ def test_what_is_not_found_is_none(name: str) -> None:
 
 def test_a_lag_that_is_not_determined_is_not_told() -> None:
     """What changes takes its place: no amount of it is to be given."""
-    assert denied("lag", 0.13, (0.0, None)) == UNTOLD
+    assert denied("lag", 0.13, (0.0, None)) == LAG_NOT_TOLD
 
 
 def test_only_what_is_tried_with_all_else_as_it_was_asked_for_is_denied() -> None:

@@ -10,10 +10,12 @@ from tvident._advice.marks import Numbers, marks_that_stay, without_masked_marks
 from tvident._advice.plausible import Plausible
 from tvident._advice.search import FoundBySearch, words_of_search
 from tvident._advice.strong import ExplainedStrong
+from tvident._advice.undescribed import LAG_NOT_TOLD, in_vain, none_there
 from tvident._advice.weak import FREE_OFFSET, Explained
 
 __all__ = [
     "FREE_OFFSET",
+    "LAG_NOT_TOLD",
     "NOT_DISTINGUISHED",
     "Explained",
     "ExplainedStrong",
@@ -26,7 +28,9 @@ __all__ = [
     "fed_back_in_records",
     "found_expansion",
     "held",
+    "in_vain",
     "marks_that_stay",
+    "none_there",
     "spoilt",
     "untold",
     "without_masked_marks",

@@ -15,7 +15,7 @@ _CURE = (
     "samples at which it acts"
 )
 
-UNTOLD = (
+LAG_NOT_TOLD = (
     "what is left looks like a lag of the torque, but the record does not tell it from what changes: give lag='auto' to have errors hold "
     "whatever it is; if both channels are sampled at the same time, nothing need be done"
 )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tvident import _core
-from tvident._advice.undescribed import UNTOLD, none_there
+from tvident._advice import LAG_NOT_TOLD, none_there
 from tvident._arguments import percent, with_error
 from tvident._equation import COEFFICIENTS
 from tvident._identify.first_look import FirstLook
@@ -109,7 +109,7 @@ class BesideChanges(TriedRecord):
                 continue
             value, error = self._amount(one.name, found)
             if error is None:
-                words[one.name] = UNTOLD
+                words[one.name] = LAG_NOT_TOLD
             elif abs(value) + _BY_CHANCE * error < _LEAST_PART * abs(one.value):
                 unit = "samples" if one.name == "lag" else found.units.get(one.name, "")
                 words[one.name] = none_there(one.name, f"{with_error(value, error)} {unit}")

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from tvident import _core
-from tvident._advice import NOT_DISTINGUISHED, Explained
-from tvident._advice.undescribed import in_vain
+from tvident._advice import NOT_DISTINGUISHED, Explained, in_vain
 from tvident._arguments import percent
 from tvident._clocks import bridged
 from tvident._equation import BUILT_IN, COEFFICIENTS, FRICTION, OFFSET, Unknown

@@ -75,7 +75,7 @@ impl Session<'_, '_, '_> {
 
     /// By how much a coefficient may be wrong since each step of the torque may have been anywhere between two samples, from what rows move it by.
     pub(crate) fn by_steps(&self, by: &[f64], rows: StepRows<'_>) -> f64 {
-        let Steps { each, part } = steps(self.record.torque);
+        let TorqueSteps { each, part } = steps(self.record.torque);
         let StepRows { weak, rate, are_white } = rows;
         if each.is_empty() {
             return 0.0;
@@ -114,12 +114,12 @@ impl Session<'_, '_, '_> {
 
 /// Changes of a torque from one sample to the next that stand alone: the sample before each and its height, and which part of all changes they are, as
 /// squares: nothing where it moves smoothly, all of it where it is constant between steps.
-struct Steps {
+struct TorqueSteps {
     each: Vec<(usize, f64)>,
     part: f64,
 }
 
-fn steps(torque: &dyn Samples) -> Steps {
+fn steps(torque: &dyn Samples) -> TorqueSteps {
     let mut values = vec![0.0; torque.len()];
     torque.read(0, &mut values);
     let changes: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -135,7 +135,7 @@ fn steps(torque: &dyn Samples) -> Steps {
             each.push((place + 1, around[1]));
         }
     }
-    Steps { each, part: if all > 0.0 { alone / all } else { 0.0 } }
+    TorqueSteps { each, part: if all > 0.0 { alone / all } else { 0.0 } }
 }
 
 #[cfg(test)]
