@@ -218,7 +218,7 @@ mod tests {
     /// What noise is of angle and torque: little, so that a short record tells enough.
     const LITTLE: [f64; 2] = [1e-3, 3e-3];
     /// What an angle is rounded to.
-    const STEP: f64 = 1e-3;
+    const STEP: f64 = 4e-3;
     /// What a resonance five times as high as the motion leaves of fourth derivatives.
     const ABOUT: f64 = 0.15;
 
