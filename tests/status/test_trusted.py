@@ -232,6 +232,21 @@ def test_records_of_a_batch_are_trusted_as_its_verdict_says(rig: tvident.Recordi
     assert [bool(one.trusted.any()) for one in result] == [True, False, True]
 
 
+def test_records_of_a_part_of_a_batch_are_trusted_as_the_whole_is(rig: tvident.Recording) -> None:
+    """A part has no recording: records of one explained too little and were trusted."""
+    angle = np.stack([rig.angle] * 3)
+    torque = np.stack(
+        [rig.torque, rig.torque + 2 * np.random.default_rng(1).standard_normal(rig.torque.size), -rig.torque]
+    )
+    result = tvident.identify(angle, torque, sample_rate=1000)
+    each = result.trusted.any(axis=-1).tolist()
+    assert each == [True, False, False]
+    for part in (result.between(1, 3), copied(result.between(1, 3)), copied(result)):
+        assert part.trusted.any(axis=-1).tolist() == each
+        assert [bool(one.trusted.any()) for one in part] == each
+        assert part[1:].trusted.any(axis=-1).tolist() == each[1:]
+
+
 @pytest.mark.parametrize("noise", [0.0, 1e-4, 3e-3])
 def test_verdicts_take_nothing_from_records_without_a_fault(noise: float) -> None:
     rig = tvident.simulate_torsional_rig(duration=10.0, angle_noise=noise, seed=3)

@@ -30,7 +30,7 @@ from tvident._results.recorded import Recorded
 from tvident._results.scan import Scan
 from tvident._results.shown import Shown
 from tvident._results.standard_errors import StandardErrors
-from tvident._results.verdict import ExplainedTorque, distrusted
+from tvident._results.verdict import RECORDS, ExplainedTorque, distrusted
 from tvident._results.words import Words, of_batch
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD
 
@@ -373,4 +373,7 @@ class Identification(Shown):
         )
         if self._explained_each is not None:
             one._explained_each = [self._explained_each[record] for record in records]
+        if self._whole is not None or (self._recorded is None and "_distrusted" in self.__dict__):
+            # What is judged by the whole is not recorded in a part of it.
+            one._distrusted = tuple(self._distrusted[record] if record < RECORDS else None for record in records)
         return one
