@@ -15,10 +15,12 @@ CONSTANT = {"inertia": "constant", "damping": "constant", "stiffness": "windowed
 RATE = 1000.0
 
 
-def denied(name: str, seemed: float, tried: tuple[float, float | None] | None, *, varies: bool = False) -> str | None:
-    """Return what is said of a suspect that seemed to be so much, where so much was found with it, if it was tried."""
+def denied(
+    name: str, seemed: float, tried: tuple[float, float | None] | None, *, varies: bool = False, lag: float = 0.0
+) -> str | None:
+    """Return what is said of a suspect that seemed to be so much, where so much was found with it, if it was tried, beside a lag."""
     kinds: Any = CONSTANT | ({"damping": "varying"} if varies else {})
-    result: Any = SimpleNamespace(settings={"kinds": kinds, "lag": 0.0})
+    result: Any = SimpleNamespace(settings={"kinds": kinds, "lag": lag / RATE})
     identify: Any = None
     trial = Trial(identify, result, GIVEN, ["offset"], [name])
     if tried is not None:
@@ -52,3 +54,11 @@ def test_only_what_is_tried_with_all_else_as_it_was_asked_for_is_denied() -> Non
     """Beside constants alone a record in which damping varies tells nothing of a suspect."""
     assert denied("lag", 0.13, None) is None
     assert denied("lag", 0.13, (0.0, 0.001), varies=True) is None
+
+
+def test_a_lag_is_one_beside_the_lag_that_is_given() -> None:
+    """A torque that is not late, with a lag of -2 given: what is left is a lag of 2, and none in all."""
+    assert denied("lag", 2.0, (-0.02, 0.04), lag=-2.0) is None
+    words = denied("lag", 0.6, (2.0, 0.04), lag=2.0)
+    assert words is not None
+    assert "0.000 ± 0.040 samples" in words

@@ -49,6 +49,18 @@ def test_frames_that_are_lost_are_seen_in_the_times(tmp_path: Path) -> None:
     np.testing.assert_allclose(time, np.array(kept) / 1000, atol=1e-12)
 
 
+def test_a_first_frame_that_is_missing_leaves_the_times_of_the_others(tmp_path: Path) -> None:
+    """All times were missing."""
+    text = devices().replace("21,0,", ",,", 1)
+    path = tmp_path / "trial.csv"
+    path.write_text(text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        time = tvident.read_recording(path).time
+    assert time is not None
+    np.testing.assert_allclose(time[1:], np.arange(1, COUNT) / 1000, atol=1e-12)
+
+
 def test_the_first_of_several_tables_is_read_and_the_others_are_named(tmp_path: Path) -> None:
     """It was refused: "every line must have 4 cells; line 308 has 1: '100'"."""
     events = "Events\n100\nSubject,Context,Name,Time (s),Description\nS1,Left,Foot Strike,1.2,words\n\n"

@@ -52,7 +52,10 @@ def _timed(found: Channels, rate: float, say: Say) -> Channels:
         return {with_unit("time", "s"): np.arange(count) / rate, **found}
     parts = np.nanmax(part) + 1
     place = frame * parts + part
-    times = (place - place[0]) / rate
+    told = np.flatnonzero(np.isfinite(place))
+    if not told.size:
+        raise FileError("no row has a frame; export it again")
+    times = (place - place[told[0]] + told[0]) / rate
     lost = np.flatnonzero(np.diff(place) != 1)
     if lost.size:
         line = printable(f"frame {frame[lost[0] + 1]:g}")

@@ -115,14 +115,13 @@ class BesideChanges(TriedRecord):
                 words[one.name] = none_there(one.name, f"{with_error(value, error)} {unit}")
         return words
 
-    @staticmethod
-    def _amount(name: str, found: Identification) -> tuple[float, float | None]:
-        """Return what was found of a term or a lag, in samples, and its error; None where it is not determined."""
+    def _amount(self, name: str, found: Identification) -> tuple[float, float | None]:
+        """Return what was found of a term or of a lag, in samples beside what is there, and its error: None where nothing tells it."""
         if name != "lag":
             value, error, *_ = found.value(name)
             return value, error
         rate, of_lag = found.settings["sample_rate"], found.settings.get("lag_stderr")
-        return found.settings["lag"] * rate, None if of_lag is None else of_lag * rate
+        return self._lag_beside(found), None if of_lag is None else of_lag * rate
 
     @property
     def _may_change(self) -> bool:

@@ -119,15 +119,17 @@ class TriedRecord:
             return False
         return "lag" not in names or self._is_late(found)
 
+    def _lag_beside(self, found: Identification) -> float:
+        """Return by how many samples the torque of a result is late beside the lag that is there already."""
+        return float((found.settings["lag"] - self.result.settings["lag"]) * found.settings["sample_rate"])
+
     def _is_late(self, found: Identification) -> bool:
         """Return whether the lag of a result is worth a word, and about the same beside what resists the motion.
 
         Sums over samples leave something of integrals, which looks like a lag of next to nothing. Friction that is smooth looks like one:
         most of such a lag is gone beside dry friction and drag, which hardly change a true one.
         """
-        if abs(found.settings["lag"]) * found.settings["sample_rate"] < _LEAST_LAG and not self._moved(
-            found, is_more=False
-        ):
+        if abs(self._lag_beside(found)) < _LEAST_LAG and not self._moved(found, is_more=False):
             return False
         kinds = found.settings["kinds"]
         resisting = [name for name, one in BUILT_IN.items() if one.dissipates and not one.inner and name not in kinds]
