@@ -22,14 +22,19 @@ def units_of_table(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:
     """Return units by the names of columns, as an entry ``units`` of the table's metadata has them, or attributes of pandas."""
     if not metadata:
         return {}
-    lower = {key.decode(errors="replace").lower(): text for key, text in metadata.items()}
+    said = _said(metadata)
     attributes = _json(metadata.get(_PANDAS, b""))
     found: dict[str, str] = {}
     for name in reversed(_UNITS):
-        for one in (_json(lower.get(name, b"")), attributes.get(name)):
+        for one in (_json(said.get(name, b"")), attributes.get(name)):
             if isinstance(one, Mapping):
                 found |= {str(key): unit for key, unit in one.items() if isinstance(unit, str)}
     return found
+
+
+def _said(metadata: Mapping[bytes, bytes]) -> dict[str, bytes]:
+    """Return what metadata say, by keys in small letters."""
+    return {key.decode(errors="replace").lower(): text for key, text in metadata.items()}
 
 
 def _json(text: bytes) -> dict[str, Any]:
@@ -55,7 +60,7 @@ def joined_levels(name: str) -> str:
 def named_field(field: Any, units: Mapping[str, str]) -> tuple[str, str]:
     """Return what a column is called and its unit: that of its own metadata, or else of the table's."""
     name = joined_levels(field.name)
-    said = {key.decode(errors="replace").lower(): text for key, text in (field.metadata or {}).items()}
+    said = _said(field.metadata or {})
     own = (said.get("unit") or said.get("units") or b"").decode(errors="replace")
     group = field.name.rpartition(".")[0]
     return name, own or units.get(field.name) or units.get(name) or units.get(group) or ""
