@@ -12,11 +12,11 @@ import pytest
 from click.testing import CliRunner
 
 import tvident
+from in_pieces.small_pieces import cut_small
 from parameters import long
 from tvident import Status
 from tvident._command_line import main
 from tvident._files import copy_text
-from tvident._in_pieces import call, choices
 from tvident._in_pieces import copied as copied_module
 
 SAMPLES = 70_001
@@ -28,10 +28,7 @@ twice the variance of a better one differs from it by one of its errors: the var
 
 @pytest.fixture(autouse=True)
 def _small_pieces(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(call, "PIECE", 20_000)
-    monkeypatch.setattr(call, "LONG_PIECE", 20_000)
-    monkeypatch.setattr(choices, "STRETCH", 8_000)
-    monkeypatch.chdir(tmp_path)
+    cut_small(monkeypatch, tmp_path)
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,9 @@ import numpy.typing as npt
 import pytest
 
 import tvident
+from in_pieces.small_pieces import cut_small
 from parameters import long
-from tvident._in_pieces import call, choices, told_by_weak_form
+from tvident._in_pieces import told_by_weak_form
 
 Array = npt.NDArray[np.float64]
 
@@ -22,11 +23,8 @@ CONSTANT: Any = dict.fromkeys(("inertia", "damping", "stiffness"), "constant")
 
 @pytest.fixture(autouse=True)
 def _small_pieces(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(call, "PIECE", 20_000)
-    monkeypatch.setattr(call, "LONG_PIECE", 20_000)
-    monkeypatch.setattr(choices, "STRETCH", 8_000)
+    cut_small(monkeypatch, tmp_path)
     monkeypatch.setattr(told_by_weak_form, "_STRETCH", 10_000)
-    monkeypatch.chdir(tmp_path)
 
 
 @pytest.fixture(scope="module")
