@@ -155,29 +155,38 @@ def test_a_part_of_which_nothing_is_there_is_not_the_busiest(how: str) -> None:
     assert result.summary().startswith("do not trust: another equation explains more")
 
 
+@pytest.mark.parametrize("given", [0.0, -1.0, 3.0])
 @pytest.mark.parametrize(
     ("left", "error", "is_late"),
     [(0.98, 0.01, True), (0.4, 0.01, False), (-0.1, 0.26, False), (0.4, 0.5, True), (0.0, None, True)],
 )
-def test_a_lag_most_of_which_is_gone_beside_friction_is_none(left: float, error: float | None, is_late: bool) -> None:
-    """One that is within chance of what it was, or is not determined beside friction, is not shown to be any."""
+def test_a_lag_most_of_which_is_gone_beside_friction_is_none(
+    left: float, error: float | None, is_late: bool, given: float
+) -> None:
+    """One that is within chance of what it was, or is not determined beside friction, is not shown to be any.
+
+    All lags are told beside the one that is given.
+    """
     asked: list[dict[str, Any]] = []
 
-    def identify(**given: Any) -> Any:
-        asked.append(given)
-        return SimpleNamespace(settings={"lag": left} | ({} if error is None else {"lag_stderr": error}))
+    def identify(**asked_for: Any) -> Any:
+        asked.append(asked_for)
+        return SimpleNamespace(
+            settings={"lag": given + left, "sample_rate": 1.0} | ({} if error is None else {"lag_stderr": error})
+        )
 
     kinds = {"inertia": "constant", "damping": "varying", "stiffness": "windowed", "offset": "windowed"}
     settings = {
         "kinds": kinds,
-        "lag": 1.0,
+        "lag": given,
         "window_length": 21,
         "exponent": 9,
         "regression_window": 84,
         "sample_rate": 1.0,
     }
-    found: Any = SimpleNamespace(settings=settings)
-    trial = Trial(identify, found, AUTOMATIC, ["offset"], ["lag"])
+    result: Any = SimpleNamespace(settings=settings)
+    found: Any = SimpleNamespace(settings=settings | {"lag": given + 1.0})
+    trial = Trial(identify, result, AUTOMATIC, ["offset"], ["lag"])
     assert trial._is_late(found) == is_late  # noqa: SLF001 - what is tried is the test
     terms = [("offset", "windowed"), ("coulomb", "constant"), ("quadratic_drag", "constant")]
     lengths = {name: settings[name] for name in ("window_length", "exponent", "regression_window")}
@@ -194,9 +203,10 @@ def test_a_lag_of_next_to_nothing_is_told_where_it_moves_something(moved: str) -
             return moved
 
     def identify(**_: Any) -> Any:
-        return SimpleNamespace(settings={"lag": 1e-6, "lag_stderr": 1e-9})
+        return SimpleNamespace(settings={"lag": 1e-6, "lag_stderr": 1e-9, "sample_rate": 1000.0})
 
     kinds = {"inertia": "constant", "damping": "constant", "stiffness": "constant"}
-    settings = {"kinds": kinds, "lag": 1e-6, "window_length": 21, "exponent": 9, "sample_rate": 1000.0}
-    found: Any = SimpleNamespace(settings=settings)
-    assert Moving(identify, found, AUTOMATIC, [], ["lag"])._is_late(found) == bool(moved)  # noqa: SLF001 - as above
+    settings = {"kinds": kinds, "lag": 0.0, "window_length": 21, "exponent": 9, "sample_rate": 1000.0}
+    result: Any = SimpleNamespace(settings=settings)
+    found: Any = SimpleNamespace(settings=settings | {"lag": 1e-6})
+    assert Moving(identify, result, AUTOMATIC, [], ["lag"])._is_late(found) == bool(moved)  # noqa: SLF001 - as above

@@ -147,8 +147,11 @@ class TriedRecord:
             beside = self.identify(**asked, terms=terms, lag="auto", **lengths)
         except ValueError:
             return True
-        late, left, error = found.settings["lag"], beside.settings["lag"], beside.settings.get("lag_stderr")
-        return error is None or bool(left / late >= _MOST_OF_LAG or abs(late - left) <= _BY_CHANCE * error)
+        late, left, error = self._lag_beside(found), self._lag_beside(beside), beside.settings.get("lag_stderr")
+        if error is None:
+            return True
+        chance = _BY_CHANCE * error * found.settings["sample_rate"]
+        return left * late >= _MOST_OF_LAG * late**2 or abs(late - left) <= chance
 
     def _feeds_energy(self, found: Identification) -> bool:
         """Return whether a machine has a negative inertia or damping with another equation only."""
