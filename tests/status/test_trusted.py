@@ -270,3 +270,63 @@ def test_trials_that_the_verdict_distrusts_are_not_trusted() -> None:
     assert not bad.trusted.any()
     assert not bad.between(1.0, 2.0).trusted.any()
     assert not copied(bad).trusted.any()
+
+
+def test_what_is_shown_by_itself_waits_for_no_trial(rig: tvident.Recording) -> None:
+    """In a notebook a result of 20 s, low-passed, was shown after 4 s."""
+    result = tvident.identify(*disturbed(rig), sample_rate=1000, method="paper", **CONSTANT)
+    improve = result._recorded.improve  # noqa: SLF001 - what tries
+    tried: list[str] = []
+
+    def counted(*given: Any) -> Any:
+        tried.append("once")
+        return improve(*given)
+
+    object.__setattr__(result._recorded, "improve", counted)  # noqa: SLF001 - likewise
+    part = result.between(1.0, 2.0)
+    for one in (result, part):
+        assert "unflagged, summary() has the verdict" in repr(one)
+        assert "result.summary() says what to do" in one._repr_html_()
+        assert "trusted" not in one.columns(judged=False)
+    assert not tried
+    verdict = result.summary().splitlines()[0].removeprefix("do not trust: ").split(";")[0]
+    assert len(tried) == 1
+    for one in (result, part):
+        assert f"0.0% can be trusted: {verdict}>" in repr(one)
+        assert "says what to do" not in one._repr_html_()
+        assert not one.columns()["trusted"].any()
+    # What needs no trial is said at once.
+    assert "0.0% can be trusted: inertia is negative" in repr(tvident.identify(*in_minus(rig), sample_rate=1000))
+
+
+@pytest.mark.parametrize("call", [{}, {"method": "paper"}], ids=str)
+@pytest.mark.parametrize("samples", [slice(None, None, 1), slice(2000, 2001)], ids=["all", "one sample"])
+def test_nothing_is_trusted_of_arrays_that_were_written_over_before_anybody_asked(
+    rig: tvident.Recording, samples: slice, call: dict[str, Any]
+) -> None:
+    angle, torque = rig.angle.copy(), rig.torque.copy()
+    asked, result = (tvident.identify(angle, torque, sample_rate=1000, **call) for _ in range(2))
+    before = asked.trusted
+    angle[samples] = angle[::-1][samples] + 1e-3 * (samples.step is None)
+    np.testing.assert_array_equal(asked.trusted, before)
+    assert "written over" not in asked.summary().splitlines()[0]
+    assert not result.trusted.any()
+    assert result.summary().startswith(
+        "do not trust: its arrays were written over before it was looked at; see what to do"
+    )
+    assert "ask for trusted or summary() before you write into them, or give copies" in result.advice[0]
+
+
+def test_records_of_a_batch_are_known_again_one_by_one(rig: tvident.Recording) -> None:
+    angles, torques = np.stack([rig.angle] * 3), np.stack([rig.torque] * 3)
+    batch = tvident.identify(angles, torques, sample_rate=1000)
+    angles[1, 100:200] = 0
+    assert [bool(one.trusted.any()) for one in batch] == [True, False, True]
+    assert "record 1: its arrays were written over" in batch.summary().splitlines()[0]
+
+
+def test_what_a_mask_held_belongs_to_what_was_identified(rig: tvident.Recording) -> None:
+    mask = np.ones(rig.angle.size, bool)
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=1000, mask=mask)
+    mask[:1000] = False
+    assert not result.trusted.any()

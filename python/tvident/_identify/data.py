@@ -106,6 +106,13 @@ class Data:
         """Whether a record has nothing beside an angle and a torque, of which any stretch can be taken."""
         return not (self.motion.recorded or self.batch or self.weights or self.clock) and self.instruments is None
 
+    @property
+    def beside(self) -> list[npt.NDArray[Any]]:
+        """What has a value for every sample beside angle and torque."""
+        weights = None if self.weights is None else self.weights.given
+        each = (*self.motion.recorded.values(), self.instruments, self.mask, weights)
+        return [one for one in each if one is not None]
+
     def of(self, place: Any) -> Data:
         """Return some of several records, as NumPy's indexing takes them."""
         return replace(

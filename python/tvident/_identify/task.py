@@ -272,6 +272,7 @@ class Task:
             again_in=partial(self._again, settings) if data.is_plain else None,
             part=part if data.batch else None,
             mask=data.mask,
+            beside=[*data.beside, *(one for one in self._known.values() if not isinstance(one, float))],
         )
 
     def _scans(self, settings: dict[str, Any]) -> tuple[Scan, ...]:

@@ -40,7 +40,7 @@ class MergedRecorded:
     positions: Sequence[npt.NDArray[np.float64]] | None = None
     structure: Any = None
     own: Mapping[str, Term] = field(default_factory=dict)
-    _marks: tuple[bytes, ...] = field(init=False, repr=False)
+    _marks: tuple[npt.NDArray[np.uint64], ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_marks", self._found_marks())
@@ -48,7 +48,7 @@ class MergedRecorded:
     @property
     def is_unchanged(self) -> bool:
         """Whether nobody has written another record into the arrays meanwhile."""
-        return self._marks == self._found_marks()
+        return all(map(np.array_equal, self._marks, self._found_marks()))
 
     def on_result(self, trial: int, values: npt.NDArray[Any], samples: int) -> npt.NDArray[np.float64]:
         """Return a channel of a trial at the samples of the result: as it is, or along the phase."""
@@ -56,6 +56,6 @@ class MergedRecorded:
             return np.asarray(values, np.float64)
         return np.asarray(np.interp(np.arange(samples), self.positions[trial], values, left=np.nan, right=np.nan))
 
-    def _found_marks(self) -> tuple[bytes, ...]:
+    def _found_marks(self) -> tuple[npt.NDArray[np.uint64], ...]:
         each = [one for of in (*self.angles, *self.torques, self.bases) for one in of if one is not None]
         return tuple(map(mark_of, each))

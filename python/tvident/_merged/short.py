@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from tvident._results import part_trusted, samples_and_seconds
+import numpy as np
+
+from tvident._results import samples_and_seconds
 
 _MOST = 8
 """Elements of a line."""
@@ -15,9 +17,12 @@ def in_one_line(result: Any, whose: str) -> str:
     values = [f"{name} {result.value(name)}" for name in list(result.elements)[:_MOST]]
     if len(result.elements) > _MOST:
         values.append(f"and {len(result.elements) - _MOST} more elements")
-    return (
-        f"<MergedIdentification of {whose}, {samples_and_seconds(result)}: {'; '.join(values)}; {part_trusted(result)}>"
-    )
+    return f"<MergedIdentification of {whose}, {samples_and_seconds(result)}: {'; '.join(values)}; {_part_trusted(result)}>"
+
+
+def _part_trusted(result: Any) -> str:
+    """Return how much of it can be trusted."""
+    return f"{float(np.mean(result.trusted)):.1%} can be trusted" if result.status.size else "no samples"
 
 
 def as_html(result: Any, whose: str) -> str:
@@ -32,7 +37,7 @@ def as_html(result: Any, whose: str) -> str:
     what = f"{whose}, {samples_and_seconds(result)}"
     lines = "".join(f"<li>{escape(line)}</li>" for line in result.advice)
     return (
-        f"<p><b>MergedIdentification of {escape(what)}</b>, {escape(part_trusted(result))}</p>"
+        f"<p><b>MergedIdentification of {escape(what)}</b>, {escape(_part_trusted(result))}</p>"
         f"<table><tr><th>element</th><th>kind</th><th>value ± standard error</th></tr>{''.join(rows)}</table>"
         f"{f'<p>what to do</p><ul>{lines}</ul>' if lines else ''}"
     )

@@ -14,7 +14,7 @@ from tvident._results.records import IdentifiedRecords, Shared, covariance_betwe
 from tvident._results.response import Model, accounted_for, every_sample, without_gaps
 from tvident._results.result import Identification
 from tvident._results.scan import Scan, scan_of
-from tvident._results.short import part_trusted, samples_and_seconds
+from tvident._results.short import samples_and_seconds
 from tvident._results.simulated import POOR, in_units_of, predicted_ahead, predicted_at_samples
 from tvident._results.stored import plain_scan, plain_words, scan_from, words_from
 from tvident._results.stored_curves import curves_from, plain_curves
@@ -105,7 +105,6 @@ __all__ = [
     "of_powers",
     "of_records",
     "of_short",
-    "part_trusted",
     "parts_of",
     "plain_curves",
     "plain_scan",

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, TypeAlias, TypeVar
 
 import numpy as np
@@ -26,8 +26,10 @@ class Changeable(Protocol):
 
 OneRecord = TypeVar("OneRecord", bound=Changeable)
 
-_LOOKED_AT = 1024
-"""Samples of each channel by which a record is known again: whoever writes another recording into the same arrays changes most of them."""
+_BLOCKS = 1024
+"""Of each record, whose sums know it again: one sample that is written over changes one of them, another order most."""
+
+Marks: TypeAlias = tuple[npt.NDArray[np.uint64], ...]
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,10 @@ class Recorded:
         stretch is no record of its own.
     mask : ndarray of bool, shape (\*, n), optional
         True where a sample counts; None where all do.
+    beside : sequence of ndarray
+        What else was given with a value for every sample.
+    marks : tuple of ndarray, optional
+        By which arrays are known again; by default those that they have now.
     """
 
     angles: Numbers
@@ -67,14 +73,18 @@ class Recorded:
     scans: Callable[[], tuple[Scan, ...]] | None = None
     again_in: Callable[[Numbers, slice, Mapping[str, Any]], Any] | None = None
     mask: npt.NDArray[np.bool_] | None = None
-    _mark: bytes = field(init=False, repr=False)
+    beside: Sequence[npt.NDArray[Any]] = ()
+    marks: Marks | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_mark", self._mark_of_given())
+        if self.marks is None:
+            object.__setattr__(self, "marks", self._marks_now())
 
     def of(self, place: Any) -> Recorded | None:
-        """Return some of several records."""
-        return None if self.part is None else self.part(place)
+        """Return some of several records, which are known again as the whole is: arrays may have been written over before."""
+        if self.part is None:
+            return None
+        return replace(self.part(place), marks=tuple(mark[place] for mark in self.marks or ()))
 
     def mask_in(self, some: slice) -> npt.NDArray[np.bool_] | None:
         """Return the mask of a stretch."""
@@ -88,17 +98,23 @@ class Recorded:
     @property
     def is_unchanged(self) -> bool:
         """Whether nobody has written another record into the arrays meanwhile."""
-        return self._mark == self._mark_of_given()
+        return all(map(np.array_equal, self.marks or (), self._marks_now()))
 
-    def _mark_of_given(self) -> bytes:
-        return b"".join(mark_of(channel) for channel in self.given)
+    def _marks_now(self) -> Marks:
+        return tuple(mark_of(channel) for channel in (*self.given, *self.beside))
 
 
-def mark_of(channel: Numbers) -> bytes:
-    """Return some samples of a channel, by which it is known again."""
-    flat = channel.reshape(-1, channel.shape[-1])
-    rows, samples = (max(1, size // some) for size, some in ((flat.shape[0], 8), (flat.shape[1], _LOOKED_AT)))
-    return np.ascontiguousarray(flat[::rows, ::samples]).tobytes()
+def mark_of(channel: npt.NDArray[Any]) -> npt.NDArray[np.uint64]:
+    r"""Return sums of the bits of the blocks of every record, shape (\*, blocks), by which a channel is known again.
+
+    They take 0.4 ns a sample, and 8 kB for a record of any length.
+    """
+    samples = channel.shape[-1]
+    if not samples:
+        return np.zeros((*channel.shape[:-1], 0), np.uint64)
+    begins = np.unique(np.linspace(0, samples, min(samples, _BLOCKS), endpoint=False).astype(np.intp))
+    bits = channel.view(f"u{channel.itemsize}")
+    return np.asarray(np.add.reduceat(bits, begins, axis=-1, dtype=np.uint64))
 
 
 def still_there(recorded: OneRecord | None, cure: str) -> OneRecord:

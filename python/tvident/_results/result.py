@@ -31,7 +31,7 @@ from tvident._results.scan import Scan
 from tvident._results.shown import Shown
 from tvident._results.standard_errors import StandardErrors
 from tvident._results.verdict import RECORDS, ExplainedTorque, distrusted
-from tvident._results.words import Words, of_batch
+from tvident._results.words import Words, of_batch, with_written_over
 from tvident._status import DOUBTFUL, DOUBTFUL_RECORD
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -162,7 +162,9 @@ class Identification(Shown):
         NOISE_MODEL, and where that of the record has none of RANK_DEFICIENT, ILL_CONDITIONED and SCALES_DISAGREE; nowhere in a record
         whose summary begins with "do not trust" for another reason than that most samples are flagged: a sign that no machine has, too
         little of the torque explained, numbers that may mark missing values, another equation or form that finds other parameters. Of a
-        batch its first hundred records are judged so. Asking for the first time takes as long as the summary.
+        batch its first hundred records are judged so; any other is judged when it is asked alone (``result[150].trusted``). Asking for
+        the first time takes as long as the summary. Ask before you write into the arrays that were given, or give copies: where they
+        hold other samples by then nobody can tell, nothing is trusted, and the verdict says so.
 
         See Also
         --------
@@ -225,6 +227,19 @@ class Identification(Shown):
         whole = self._whole
         return distrusted(self) if whole is None else whole._distrusted  # noqa: SLF001 - of this class
 
+    @property
+    def _distrusted_by_now(self) -> tuple[str | None, ...] | None:
+        """What :attr:`trusted` goes by, where that was asked before: it may take as long as to identify."""
+        found: tuple[str | None, ...] | None = (self._whole or self).__dict__.get("_distrusted")
+        return found
+
+    @property
+    def _is_told(self) -> bool:
+        """Whether nothing is tried any more before it is said what to do."""
+        whole = self._whole or self
+        recorded = whole._recorded  # noqa: SLF001 - of this class
+        return "_told" in whole.__dict__ or recorded is None or recorded.improve is None
+
     def __getstate__(self) -> dict[str, Any]:
         """Return what a pickle keeps: words, and of a single record all that its summary says, without the recording.
 
@@ -250,15 +265,18 @@ class Identification(Shown):
     # What to say is found when it is asked for: a short record is identified in less time than that takes.
     @cached_property
     def _chosen(self) -> Words:
-        return self._words if isinstance(self._words, Words) else self._words()
+        if isinstance(self._words, Words):
+            return self._words
+        recorded = self._recorded
+        return self._words() if recorded is None or recorded.is_unchanged else with_written_over(Words())
 
     @cached_property
     def _told(self) -> Words:
         words = self._chosen
         recorded = self._recorded
-        if recorded is None or recorded.improve is None or not recorded.is_unchanged:
+        if recorded is None or recorded.improve is None:
             return words
-        return recorded.improve(self, words)
+        return recorded.improve(self, words) if recorded.is_unchanged else with_written_over(words)
 
     def scan(self, record: int = 0) -> Scan:
         """Return estimates by the width of the test function, which tell whether equations of every scale agree.

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from tvident._results.verdict import distrusted_at_once, unflagged
 from tvident._status import describe
 from tvident._units import in_words_of
 
@@ -30,8 +31,21 @@ def samples_and_seconds(result: Any) -> str:
 
 
 def part_trusted(result: Any) -> str:
-    """Return how much of it can be trusted."""
-    return f"{float(np.mean(result.trusted)):.1%} can be trusted" if result.status.size else "no samples"
+    """Return how much of it can be trusted, as far as that is known: what is shown by itself waits for no trial.
+
+    Before anybody asked for the verdict it is how much has no flag that forbids that, and where to ask.
+    """
+    if not result.status.size:
+        return "no samples"
+    reasons = result._distrusted_by_now  # noqa: SLF001 - of results
+    is_single = result.inertia.ndim == 1
+    whole = result._whole or result  # noqa: SLF001 - likewise
+    reason = distrusted_at_once(whole) if reasons is None and is_single else None
+    if reasons is None and reason is None:
+        return f"{float(np.mean(unflagged(result))):.1%} unflagged, summary() has the verdict"
+    share = 0.0 if reason else float(np.mean(result.trusted))
+    reason = reasons[0] if reasons and is_single else reason
+    return f"{share:.1%} can be trusted{f': {reason}' if reason else ''}"
 
 
 def _index(record: int, batch: tuple[int, ...]) -> str:
@@ -59,7 +73,9 @@ def as_html(result: Any) -> str:
         )
     if records > _RECORDS:
         parts.append(f"<p>and {records - _RECORDS} more records: result[{_index(_RECORDS, batch)}]</p>")
-    if result.advice:
+    if not result._is_told:  # noqa: SLF001 - of results
+        parts.append("<p>result.summary() says what to do: it tries what would explain more, once</p>")
+    elif result.advice:
         parts.append(f"<p>what to do</p><ul>{''.join(f'<li>{escape(line)}</li>' for line in result.advice)}</ul>")
     described = (in_words_of(result.units, line.strip()) for line in describe(result.status, result.record_status))
     flags = "".join(f"<li>{escape(line)}</li>" for line in described)

@@ -59,14 +59,20 @@ class Shown(Simulated, Telling, Valued):
         """Return estimates by the width of the test function."""
         raise NotImplementedError
 
-    def columns(self) -> dict[str, npt.NDArray[Any]]:
+    def columns(self, *, judged: bool = True) -> dict[str, npt.NDArray[Any]]:
         """Return everything that has one value a sample, by name: what :meth:`save` writes.
+
+        Parameters
+        ----------
+        judged : bool, optional
+            False leaves ``trusted`` out: it follows the verdict, and where nobody asked for that before it takes as long as
+            :meth:`summary`, which may be seconds where something contradicts the model. Tables and files have it, so they wait for it.
 
         Returns
         -------
         dict of str to ndarray, shape (n,)
             Time, parameters and terms with their standard errors, condition number and residuals, the status of the sample and
-            of the record, and 1 where values can be trusted.
+            of the record, and 1 where values can be trusted, as :attr:`trusted` says.
 
         Raises
         ------
@@ -82,7 +88,7 @@ class Shown(Simulated, Telling, Valued):
             raise ValueError(
                 f"only a single record has columns; this one has shape {self.inertia.shape}; take one record"
             )
-        return {"time": self.time, **self._table().columns}
+        return {"time": self.time, **self._columns(judged=judged)}
 
     @property
     def trusted(self) -> npt.NDArray[np.bool_]:
@@ -100,13 +106,17 @@ class Shown(Simulated, Telling, Valued):
         return columns
 
     def _table(self) -> Table:
+        return Table(self.time, self._columns(judged=True), self.units, self.settings, self._found.labels)
+
+    def _columns(self, *, judged: bool) -> dict[str, npt.NDArray[Any]]:
         columns: dict[str, npt.NDArray[Any]] = {**self._numbers()}
         columns |= {"condition": self.condition, "residual_std": self.residual_std}
         columns |= {"order": self.order, "status": self.status}
         records = np.asarray(self.record_status, np.uint16)[..., np.newaxis]
         columns["record_status"] = np.broadcast_to(records, self.status.shape).copy()
-        columns["trusted"] = self.trusted.astype(np.uint8)
-        return Table(self.time, columns, self.units, self.settings, self._found.labels)
+        if judged:
+            columns["trusted"] = self.trusted.astype(np.uint8)
+        return columns
 
     def save(self, path: str | Path) -> None:
         """Write every column to a file, with units in the header; all that :func:`tvident.load` needs too, if the file can hold it.

@@ -221,15 +221,28 @@ def _distrusted_in_batch(result: Any) -> str | None:
 
 
 def _distrusted(result: Any, advice: Sequence[str]) -> str | None:
-    signs = (_sign(result, name) for name in ("inertia", "damping", "stiffness"))
     # What was never measured is what else looks wrong.
     return (
         found_marked(advice)
-        or why_not(
-            result, lambda: next(filter(None, signs), None), lambda: explained(result), lambda: _is_rest_noise(result)
-        )
+        or why_not(result, lambda: _wrong_sign(result), lambda: explained(result), lambda: _is_rest_noise(result))
         or found_elsewhere(advice)
+        or ("its arrays were written over before it was looked at" if _is_written_over(result) else None)
     )
+
+
+def distrusted_at_once(result: Any) -> str | None:
+    """Return why no sample of a record is to be trusted by flags and signs, which tell it without a look at the recording."""
+    return why_not(result, lambda: _wrong_sign(result), lambda: None)
+
+
+def _wrong_sign(result: Any) -> str | None:
+    signs = (_sign(result, name) for name in ("inertia", "damping", "stiffness"))
+    return next(filter(None, signs), None)
+
+
+def _is_written_over(result: Any) -> bool:
+    recorded = result._recorded  # noqa: SLF001 - of this room
+    return recorded is not None and not recorded.is_unchanged
 
 
 def why_not(

@@ -23,6 +23,9 @@ MARKED = "does it mark values that are missing?"
 STAYS = "or use method='auto', which "
 """How advice goes on about what spoils windows of the strong form, which nothing took out."""
 
+WRITTEN_OVER = "the arrays that were given hold other samples by now"
+"""How advice says that nobody can look at a recording any more."""
+
 FED_BACK = "the torque holds the angle's noise"
 UNTOLD_LAG = "the record does not tell half a sample of lag"
 NOT_CONSTANT = " was given as constant, but parts of the record differ"
@@ -47,3 +50,12 @@ def of_batch(each: Sequence[Words]) -> Words:
     """Return what there is to say of several records: advice alone, since reasons differ too much from one to the next."""
     advice = tuple(f"record {place}: {line}" for place, words in enumerate(each) for line in words.advice)
     return Words((), advice, tuple(each))
+
+
+def with_written_over(words: Words) -> Words:
+    """Return words that begin with why nothing is tried of a record, or said of it that was not said before."""
+    line = (
+        f"{WRITTEN_OVER}: what they held when they were identified cannot be looked at, and what would explain more was not tried; ask "
+        "for trusted or summary() before you write into them, or give copies"
+    )
+    return words if line in words.advice else Words(words.reasons, (line, *words.advice), words.each)
