@@ -12,6 +12,7 @@ from typing import cast
 from tvident import _arguments as arguments
 from tvident._files.beginnings import cure_of_name
 from tvident._files.channels import Channels, FileError, FileWarning, Say
+from tvident._files.clock_columns import with_clocks_in_columns
 from tvident._files.counts import said_of_counts
 from tvident._files.names import printable
 from tvident._files.no_values import marks_given, said_of_marks, without_marks
@@ -157,7 +158,7 @@ def read(path: str | Path, *, missing: float | Sequence[float] = ()) -> Channels
     except OSError as error:
         raise FileError(f"{place}: cannot be read ({error.strerror or error}); check that it is whole") from None
     channels = {name: without_marks(values, marks) for name, values in channels.items()} if marks else channels
-    channels = with_whole_clocks(channels, said.append)
+    channels = with_whole_clocks(with_clocks_in_columns(channels, said.append), said.append)
     said += said_of_marks(channels) + list(said_of_counts(channels))
     for message in said:
         warnings.warn(f"{place}: {message}", FileWarning, stacklevel=2)
