@@ -13,6 +13,8 @@ _BEGINNINGS = {
     b"PAR1": ".parquet",
     b"ARROW1": ".feather",
     b"\x89HDF": ".h5",
+    b"CDF\x01": ".nc",
+    b"CDF\x02": ".nc",
     b"MATLAB": ".mat",
     b"TDSm": ".tdms",
     b"MDF     ": ".mf4",
@@ -27,7 +29,8 @@ _BEGINNINGS = {
 _OTHER_ENDINGS = {
     ".npz": (".xlsx", ".xlsm"),
     ".feather": (".arrow",),
-    ".h5": (".hdf5", ".hdf"),
+    ".h5": (".hdf5", ".hdf", ".nc", ".nc4", ".cdf"),
+    ".nc": (".nc4", ".cdf"),
     ".mf4": (".mdf",),
     ".csv.gz": (".txt.gz", ".tsv.gz", ".dat.gz", ".asc.gz", ".log.gz", ".xdfz", ".gz"),
     ".lvm": (".csv", ".txt", ".tsv", ".dat", ".asc", ".log"),

@@ -84,8 +84,8 @@ def read(path: str | Path, *, missing: float | Sequence[float] = ()) -> Channels
     Parameters
     ----------
     path : str or Path
-        A text file of columns, JSON, an NPY or NPZ file, or with an extra: Parquet, HDF5, Zarr, MATLAB, TDMS, xlsx (``io``), MDF (``mdf``),
-        universal files (``uff``), C3D (``c3d``), XDF (``xdf``), ROS bags and MCAP (``ros``).
+        A text file of columns, JSON, an NPY or NPZ file, or with an extra: Parquet, HDF5, netCDF, Zarr,
+        MATLAB, TDMS, xlsx (``io``), MDF (``mdf``), universal files (``uff``), C3D (``c3d``), XDF (``xdf``), ROS bags and MCAP (``ros``).
     missing : float or sequence of float, optional
         Numbers that mark values that are missing, as -9999: they become NaN. One that is far from all other values of a channel is asked
         for in a warning.

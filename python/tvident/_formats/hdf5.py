@@ -17,7 +17,7 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     import numpy as np  # noqa: PLC0415 - within the limits
 
     with h5py.File(path, "r") as file:
-        found = dict(_datasets(file, "", h5py))
+        found = dict(datasets(file, "", h5py))
         parts = {
             one.name: one.attrs for dataset in found.values() for one in (dataset, dataset.parent) if one.name != "/"
         }
@@ -56,7 +56,7 @@ def _never_written(name: str, dataset: Any) -> Iterator[Remark]:
         yield Remark(f"{name}: {lacking} of {chunks} chunks were never written and were read as {dataset.fillvalue}")
 
 
-def _datasets(group: Any, prefix: str, h5py: Any) -> Iterator[tuple[str, Any]]:
+def datasets(group: Any, prefix: str, h5py: Any) -> Iterator[tuple[str, Any]]:
     """Give all datasets in the order in which they were made, where the file keeps it."""
     for name in group:
         if isinstance(group.get(name, getlink=True), h5py.HardLink):
@@ -64,7 +64,7 @@ def _datasets(group: Any, prefix: str, h5py: Any) -> Iterator[tuple[str, Any]]:
             if isinstance(one, h5py.Dataset):
                 yield prefix + name, one
             elif isinstance(one, h5py.Group):
-                yield from _datasets(one, f"{prefix}{name}/", h5py)
+                yield from datasets(one, f"{prefix}{name}/", h5py)
 
 
 def _lists(found: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:

@@ -39,6 +39,7 @@ class Format:
 
 _MATLAB = Format("a MATLAB file", "matlab", "pymatreader", "io", "save it again with -v7")
 _HDF5 = Format("an HDF5 file", "hdf5", "h5py", "io")
+_NETCDF = Format("a netCDF file", "netcdf", "h5py", "io", "copy it again, or save it with xarray's to_netcdf()")
 _XLSX = Format("a workbook", "xlsx", "openpyxl", "io", "save it again, or export CSV")
 _MDF = Format("an MDF file", "mdf", "asammdf", "mdf", slowness=4)
 _UFF = Format("a universal file", "uff", "pyuff", "uff")
@@ -57,6 +58,9 @@ FORMATS = {
     ".h5": _HDF5,
     ".hdf5": _HDF5,
     ".hdf": _HDF5,
+    ".nc": _NETCDF,
+    ".nc4": _NETCDF,
+    ".cdf": _NETCDF,
     ".tdms": Format("a TDMS file", "tdms", "nptdms", "io"),
     ".xlsx": _XLSX,
     ".xlsm": _XLSX,
