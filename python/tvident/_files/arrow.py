@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import chain
+from itertools import count as count_from
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +37,7 @@ def read_arrow(path: Path, say: Say) -> Channels:
     check_count(table.num_columns)
     channels: Channels = {}
     skipped: list[str] = []
+    names: set[str] = set()
     units = units_of_table(table.schema.metadata)
     for field, column in flat_columns(pa, table):
         name, unit = named_field(field, units)
@@ -47,10 +50,23 @@ def read_arrow(path: Path, say: Say) -> Channels:
         if pa.types.is_timestamp(field.type) or pa.types.is_duration(field.type):
             unit = "s"
             name = "time" if name == NO_NAME and not {"time", "time [s]"} & channels.keys() else name
+        name = _of_its_own(name, names, say)
         channels[name if named_unit(name)[1] else with_unit(name, unit)] = values
     if skipped:
         say(f"not read: {listed(skipped)}; channels are numbers")
     return channels
+
+
+def _of_its_own(name: str, others: set[str], say: Say) -> str:
+    """Return a name that no other has, and keep it: structures beside columns may have parts that are called as these are."""
+    unique = next(one for one in chain([name], (f"{name}_{count}" for count in count_from(2))) if one not in others)
+    if unique != name:
+        say(
+            f"two columns are called '{printable(name, 40)}', one of them part of a structure: the later one is "
+            f"'{printable(unique, 40)}'"
+        )
+    others.add(unique)
+    return unique
 
 
 def _numbers(pa: Any, column: Any) -> Any:

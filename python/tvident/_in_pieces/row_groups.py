@@ -59,6 +59,18 @@ class ParquetRows:
 
         found = {}
         units = units_of_table(self._file.schema_arrow.metadata)
+        inside = {
+            f"{one.name}.{part.name}"
+            for one in self._file.schema_arrow
+            if pa.types.is_struct(one.type)
+            for part in one.type
+        }
+        for one in self._file.schema_arrow:
+            if one.name in inside:
+                raise FileError(
+                    f"{printable(self.path)}: columns must have names of their own; '{printable(one.name, 40)}' is a column, and a part of "
+                    "a structure; rename one of them"
+                )
         for one in self._file.schema_arrow:
             if pa.types.is_integer(one.type) or pa.types.is_floating(one.type):
                 name, unit = named_field(one, units)

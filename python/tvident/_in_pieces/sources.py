@@ -76,14 +76,16 @@ class _Unmarked:
 
 @dataclass(frozen=True)
 class _OfArray:
-    """A vector, or a column of a matrix, of anything that is sliced as NumPy's arrays are."""
+    """A vector, or a column or row of a matrix, of anything that is sliced as NumPy's arrays are."""
 
     array: Any
-    column: int | None = None
+    place: int | None = None
+    is_row: bool = False
 
     def read(self, first: int, end: int) -> npt.NDArray[Any]:
-        part = self.array[first:end] if self.column is None else self.array[first:end, self.column]
-        return np.asarray(part)
+        if self.place is None:
+            return np.asarray(self.array[first:end])
+        return np.asarray(self.array[self.place, first:end] if self.is_row else self.array[first:end, self.place])
 
 
 class RowsOfFile:
@@ -221,22 +223,26 @@ def _of_arrays(found: Mapping[str, Any]) -> dict[str, tuple[SourceChannel, int]]
         if array.ndim == 1:
             channels[with_unit(name or "0", units[0] if len(units) == 1 else "")] = (_OfArray(array), array.shape[0])
         elif array.ndim == 2:  # noqa: PLR2004 - samples and channels
-            count = array.shape[1]
+            names, is_row = _names_in_matrix(array)
+            count = len(names)
             units = units if len(units) == count else units[:1] * count if len(units) == 1 else [""] * count
-            names = _names_of_columns(array)
-            for column, (called, unit) in enumerate(zip(names, units, strict=True)):
-                channels[with_unit(f"{name}.{called}".lstrip("."), unit)] = (_OfArray(array, column), array.shape[0])
+            for place, (called, unit) in enumerate(zip(names, units, strict=True)):
+                full = with_unit(name if name and 1 in array.shape else f"{name}.{called}".lstrip("."), unit)
+                channels[full] = (_OfArray(array, place, is_row), max(array.shape))
     return channels
 
 
-def _names_of_columns(array: Any) -> list[str]:
-    """Return the names of the columns of a matrix, as an attribute of it lists them, or their numbers."""
-    count = array.shape[1]
+def _names_in_matrix(array: Any) -> tuple[list[str], bool]:
+    """Return the names of the channels of a matrix, as an attribute of it lists them, or their numbers; and whether these are rows.
+
+    Where nothing names either, channels are fewer than samples.
+    """
     for key in _COLUMNS:
         names = [_text(one) for one in np.ravel(array.attrs.get(key, ())).tolist()]
-        if len(set(names)) == count and all(names):
-            return names
-    return list(map(str, range(count)))
+        if len(set(names)) == len(names) in array.shape and all(names):
+            return names, array.shape[1] != len(names)
+    rows, columns = array.shape
+    return list(map(str, range(min(rows, columns)))), rows < columns
 
 
 def _text(one: object) -> str:
