@@ -16,6 +16,7 @@ from tvident._arguments import is_called_time
 from tvident._files.channels import Channels, FileError, Say
 from tvident._files.dialect import Dialect, dialect_of, mixed_line
 from tvident._files.headers import CURE
+from tvident._files.lists import without_lists
 from tvident._files.names import printable
 from tvident._files.rows import Numbers, OtherDecimalSignError, Rows, check_text
 from tvident._files.times import TimeColumn
@@ -188,6 +189,7 @@ def _read(file: TextIO, decimal: str | None, say: Say) -> Channels:
 
 def _begun(file: TextIO, decimal: str | None, say: Say) -> tuple[Dialect, Rows, Iterator[Numbers]] | None:
     """Return how a text is written and its rows, piece by piece; None where it is empty."""
+    file = without_lists(file, say)
     head = file.read(_HEAD)
     rest = file.readline(_LONGEST_LINE) if head and not head.endswith("\n") else ""
     if len(rest) >= _LONGEST_LINE:
