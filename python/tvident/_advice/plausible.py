@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -128,30 +128,7 @@ class Plausible:
         return [f"there is one sample in {self.period:.4g} s: is the time in {question}"]
 
     def _signs(self, found: Estimates, record: int) -> list[str]:
-        sign = {name: self._sign(found, name, record) for name in ("inertia", "damping", "stiffness")}
-        negative = [name for name, one in sign.items() if one < 0]
-        if not negative:
-            return []
-        if sign["inertia"] < 0 < sign["stiffness"]:
-            return ["inertia is negative and stiffness positive: are the channels of angle and torque swapped?"]
-        if sign["inertia"] < 0:
-            words = listed(negative)
-            question = f"{words} {'are' if len(negative) > 1 else 'is'} negative: is the torque's sign reversed, are the channels swapped?"
-            return [
-                f"{question} The torque is the one that acts on the system; if it is the reaction to it, pass -torque"
-            ]
-        asked = []
-        if sign["stiffness"] < 0 < sign["inertia"]:
-            asked.append(
-                "stiffness has the other sign than inertia: so it is about an unstable position, as of an inverted pendulum; else look "
-                "for a missing term (gravity, offset) or for a controller's torque that was not recorded"
-            )
-        if sign["damping"] < 0:
-            asked.append(
-                "damping is negative: energy would be fed in. Is the torque late (lag='auto'), was one channel filtered, does a controller "
-                "act (instrument=)?"
-            )
-        return asked
+        return asked_of_signs({name: self._sign(found, name, record) for name in ("inertia", "damping", "stiffness")})
 
     def _no_spring(self, found: Estimates) -> list[str]:
         """Return what to try where the stiffness of one record is not told from zero, and something else of its motion is told."""
@@ -182,14 +159,44 @@ class Plausible:
         )
         if name in found.factors:
             errors = errors * np.asarray(found.factors[name]).reshape(-1)[record]
-        known = np.isfinite(values) & np.isfinite(errors)
-        if not known.any():
-            return 0
-        certain = known & (np.abs(values) > _CERTAIN * errors)
-        for sign in (-1, 1):
-            if np.count_nonzero(certain & (sign * values > 0)) >= _MOSTLY * np.count_nonzero(known):
-                return sign
+        return certain_sign(values, errors)
+
+
+def certain_sign(values: npt.NDArray[np.float64], errors: npt.NDArray[np.float64]) -> int:
+    """Return 1 or -1 where the sign of most values is certain, 0 otherwise."""
+    known = np.isfinite(values) & np.isfinite(errors)
+    if not known.any():
         return 0
+    certain = known & (np.abs(values) > _CERTAIN * errors)
+    for sign in (-1, 1):
+        if np.count_nonzero(certain & (sign * values > 0)) >= _MOSTLY * np.count_nonzero(known):
+            return sign
+    return 0
+
+
+def asked_of_signs(sign: Mapping[str, int]) -> list[str]:
+    """Return what explains signs that no machine has, in words: of inertia, damping and stiffness, 0 where none is certain."""
+    negative = [name for name, one in sign.items() if one < 0]
+    if not negative:
+        return []
+    if sign["inertia"] < 0 < sign["stiffness"]:
+        return ["inertia is negative and stiffness positive: are the channels of angle and torque swapped?"]
+    if sign["inertia"] < 0:
+        words = listed(negative)
+        question = f"{words} {'are' if len(negative) > 1 else 'is'} negative: is the torque's sign reversed, are the channels swapped?"
+        return [f"{question} The torque is the one that acts on the system; if it is the reaction to it, pass -torque"]
+    asked = []
+    if sign["stiffness"] < 0 < sign["inertia"]:
+        asked.append(
+            "stiffness has the other sign than inertia: so it is about an unstable position, as of an inverted pendulum; else look "
+            "for a missing term (gravity, offset) or for a controller's torque that was not recorded"
+        )
+    if sign["damping"] < 0:
+        asked.append(
+            "damping is negative: energy would be fed in. Is the torque late (lag='auto'), was one channel filtered, does a controller "
+            "act (instrument=)?"
+        )
+    return asked
 
 
 def _in_words(rate: float) -> str:

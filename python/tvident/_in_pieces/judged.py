@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from tvident._advice import asked_of_signs, certain_sign
 from tvident._equation import COEFFICIENTS
-from tvident._identify import CONTRADICTED
 from tvident._pieces import Columns
 from tvident._results import (
-    CHANGING,
-    SYMBOLS,
     found_elsewhere,
     found_marked,
-    known_to,
+    how_well_known,
     mostly_flagged,
-    negative,
-    relative_error,
     verdict_of_distrusted,
     verdict_of_trusted,
     why_not,
+    wrong_sign,
 )
-from tvident._status import DOUBTFUL, DOUBTFUL_RECORD, Status
+from tvident._status import DOUBTFUL, DOUBTFUL_RECORD
 from tvident._units import in_words_of
+
+_LOOK = "identify a stretch of it in memory, of read_recording(…).select(0, 60), say: its summary() tries what would explain that"
+"""What to do where nothing else was found."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class JudgedRows:
     """
 
     columns: Columns
-    record_status: Status
+    record_status: Any
     advice: Sequence[str]
     settings: Mapping[str, Any]
     units: Mapping[str, str]
@@ -55,44 +55,57 @@ class JudgedRows:
         return np.asarray(self.columns["status"], np.uint16)
 
     @property
+    def inertia(self) -> npt.NDArray[np.float64]:
+        """Of the rows."""
+        return self.columns["inertia"]
+
+    @property
+    def damping(self) -> npt.NDArray[np.float64]:
+        """Of the rows."""
+        return self.columns["damping"]
+
+    @property
+    def stiffness(self) -> npt.NDArray[np.float64]:
+        """Of the rows."""
+        return self.columns["stiffness"]
+
+    @property
+    def stderr(self) -> Mapping[str, npt.NDArray[np.float64]]:
+        """Standard errors of the rows, by parameter."""
+        return {name: self.columns[f"{name}_stderr"] for name in COEFFICIENTS}
+
+    @property
     def _unflagged(self) -> npt.NDArray[np.bool_]:
         good = (self.status & np.uint16(DOUBTFUL) == 0) & (not self.record_status & DOUBTFUL_RECORD)
         for name in COEFFICIENTS:
             good &= np.isfinite(self.columns[name])
         return np.asarray(good)
 
-    def verdict(self) -> str:
-        """Return how well parameters are known, or why not to trust them."""
-        reason = (
+    @property
+    def _reason(self) -> str | None:
+        """Why nothing is to be trusted, by the rules for a recording in memory; None where nothing says so."""
+        return (
             found_marked(self.advice)
-            or why_not(self, self._sign, lambda: None)
+            or why_not(self, lambda: wrong_sign(self), lambda: None)
             or mostly_flagged(self)
             or found_elsewhere(self.advice)
         )
-        words = verdict_of_distrusted(self, reason) if reason else verdict_of_trusted(self, self._known(), None)
+
+    def verdict(self) -> str:
+        """Return how well parameters are known, or why not to trust them."""
+        reason = self._reason
+        words = verdict_of_distrusted(self, reason) if reason else verdict_of_trusted(self, how_well_known(self), None)
         return in_words_of(self.units, words)
 
-    def _kinds(self) -> dict[str, str]:
-        kinds: Mapping[str, str] = self.settings["kinds"]
-        return {name: kinds[name] for name in SYMBOLS if kinds[name] != "known"}
-
-    def _sign(self) -> str | None:
-        """Return which parameter has a sign that no machine has, in words."""
-        good = self._unflagged if self._unflagged.any() else np.ones(self.status.size, bool)
-        is_contradicted = self.settings["form"] == "strong" or bool(self.record_status & CONTRADICTED)
-        for name in self._kinds():
-            value, error = (self.columns[of][good] for of in (name, f"{name}_stderr"))
-            words = negative(value, error)
-            if name != "stiffness" and words:
-                return f"{name} {words}"
-            if name == "stiffness" and is_contradicted and words and negative(-value, error):
-                return "stiffness has both signs"
-        return None
-
-    def _known(self) -> str:
-        found = []
-        for name, kind in self._kinds().items():
-            relative = relative_error(self.columns[name], self.columns[f"{name}_stderr"], self._unflagged)
-            if relative is not None:
-                found.append((f"{SYMBOLS[name]}(t)" if kind in CHANGING else SYMBOLS[name], relative))
-        return known_to(found)
+    def with_cure(self) -> JudgedRows:
+        """Return the same with what explains a sign that no machine has before its advice, and with advice where nothing is trusted."""
+        kinds = self.settings["kinds"]
+        signs = {
+            name: certain_sign(getattr(self, name), self.stderr[name]) if kinds[name] != "known" else 0
+            for name in COEFFICIENTS
+        }
+        asked = [in_words_of(self.units, line) for line in asked_of_signs(signs)]
+        # Stretches may have said it, in the same words behind other names.
+        unsaid = [line for line in asked if not any(line.partition(": ")[2] in one for one in self.advice)]
+        advice = [*unsaid, *self.advice]
+        return replace(self, advice=advice or ([_LOOK] if self._reason else []))

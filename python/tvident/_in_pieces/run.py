@@ -193,8 +193,10 @@ class Run:
             advice += notes[0]["advice"]
         constants = {name: (mean.value, mean.error) for name, mean in means.items()}
         advice = [*self._told_by_weak_form(work, means), *advice]
-        judged = JudgedRows(self._some_rows(work, means), status, advice, settings, self._asked.units)
-        verdict = judged.verdict() if self._kept.count else "no verdict: there are no rows"
+        verdict = "no verdict: there are no rows"
+        if self._kept.count:
+            judged = JudgedRows(self._some_rows(work, means), status, advice, settings, self._asked.units).with_cure()
+            verdict, advice = judged.verdict(), list(judged.advice)
         told = {"settings": settings, "constants": constants, "record_status": int(status), "advice": advice}
         told["verdict"] = verdict
         self._put_in_place(work, means, told)

@@ -27,6 +27,7 @@ from tvident._results.verdict import (
     SYMBOLS,
     found_elsewhere,
     found_marked,
+    how_well_known,
     known_to,
     mostly_flagged,
     negative,
@@ -37,6 +38,7 @@ from tvident._results.verdict import (
     verdict_of_distrusted,
     verdict_of_trusted,
     why_not,
+    wrong_sign,
 )
 from tvident._results.windows_beside import WindowsBeside
 from tvident._results.words import (
@@ -91,6 +93,7 @@ __all__ = [
     "found_elsewhere",
     "found_marked",
     "from_file",
+    "how_well_known",
     "in_units_of",
     "kernels_of",
     "known_name",
@@ -131,4 +134,5 @@ __all__ = [
     "with_shared",
     "without_gaps",
     "words_from",
+    "wrong_sign",
 ]

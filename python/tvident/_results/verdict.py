@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from tvident import _core
 from tvident._arguments import explained_in_words, percent, percentiles, to_digits_of, told_once
+from tvident._results.measured import number_of
 from tvident._results.torque import noise_of_compared
 from tvident._results.words import BECOMES, CONDITIONS, MARKED, OF_WEAK_FORM, OTHER_UNIT, STAYS, TRIED
 from tvident._status import Status
@@ -94,7 +95,7 @@ def _verdict(result: Any, share: float | None) -> str:
         for place, reason in each
         if (words := reason or mostly_flagged(result[place if len(place) > 1 else place[0]]))
     }
-    known = _errors(result)
+    known = how_well_known(result)
     words = f"{count} records: {known}" if known else f"{count} records"
     if len(places) < count:
         words += f"; the first {len(places)} were looked at"
@@ -111,7 +112,7 @@ def _of_one(result: Any, known: float | None) -> str:
     reason = result._distrusted[0] or mostly_flagged(result)  # noqa: SLF001 - likewise
     if reason:
         return verdict_of_distrusted(result, reason)
-    return verdict_of_trusted(result, _errors(result), explained(result))
+    return verdict_of_trusted(result, how_well_known(result), explained(result))
 
 
 def found_marked(advice: Sequence[str]) -> str | None:
@@ -224,7 +225,7 @@ def _distrusted(result: Any, advice: Sequence[str]) -> str | None:
     # What was never measured is what else looks wrong.
     return (
         found_marked(advice)
-        or why_not(result, lambda: _wrong_sign(result), lambda: explained(result), lambda: _is_rest_noise(result))
+        or why_not(result, lambda: wrong_sign(result), lambda: explained(result), lambda: _is_rest_noise(result))
         or found_elsewhere(advice)
         or ("its arrays were written over before it was looked at" if _is_written_over(result) else None)
     )
@@ -232,10 +233,11 @@ def _distrusted(result: Any, advice: Sequence[str]) -> str | None:
 
 def distrusted_at_once(result: Any) -> str | None:
     """Return why no sample of a record is to be trusted by flags and signs, which tell it without a look at the recording."""
-    return why_not(result, lambda: _wrong_sign(result), lambda: None)
+    return why_not(result, lambda: wrong_sign(result), lambda: None)
 
 
-def _wrong_sign(result: Any) -> str | None:
+def wrong_sign(result: Any) -> str | None:
+    """Return which parameter has a sign that no machine has, in words, of a result or of rows of one; None where none has."""
     signs = (_sign(result, name) for name in ("inertia", "damping", "stiffness"))
     return next(filter(None, signs), None)
 
@@ -306,7 +308,8 @@ def _sign(result: Any, name: str) -> str | None:
         return f"{name} {words}" if words else None
     is_contradicted = result.settings["form"] == "strong" or result.record_status & _CONTRADICTED
     if is_contradicted and negative(value, error) and negative(-value, error):
-        one = result.value(name)
+        kind, unit = result.settings["kinds"][name], result.units[name]
+        one = number_of(getattr(result, name), result.stderr[name], kind, unit, unflagged(result))
         ends = " to ".join(to_digits_of(end, one.stderr) for end in (one.least, one.greatest))
         return f"stiffness has both signs ({ends} {one.unit})"
     return None
@@ -318,8 +321,8 @@ def _believed(result: Any, values: Any) -> Any:
     return values[good] if good.any() and told_once(values).shape[-1] > 1 else values
 
 
-def _errors(result: Any) -> str:
-    """Return how well every unknown parameter is known, relative to itself."""
+def how_well_known(result: Any) -> str:
+    """Return how well every unknown parameter is known, relative to itself, of a result or of rows of one."""
     found, trusted = [], unflagged(result)
     for name, symbol in SYMBOLS.items():
         kind = result.settings["kinds"][name]

@@ -128,7 +128,7 @@ def factor_to(system: System, quantity: str, text: str | None, *, name: str) -> 
     if doubt is not None:
         meant, _, _ = doubt.replace(",", "").partition(" ")
         raise UnitError(
-            f"the unit of {name} must mean one thing; got {text!r}: {doubt}; give {quantity}_unit={meant!r}, or another"
+            f"the unit of {name} must mean one thing; got {text.replace('?', '')!r}: {doubt}; give {quantity}_unit={meant!r}, or another"
         )
     part = "; a percentage must be multiplied by the torque of 1 %" if quantity == "torque" and "%" in text else ""
     if quantity == "angle" and _COUNTS.fullmatch(text.strip("[](){}<> .")):

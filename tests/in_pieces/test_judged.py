@@ -1,0 +1,101 @@
+"""The verdict on a file follows the rules for a recording in memory, and says what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.signal import chirp, lsim
+
+import tvident
+from in_pieces.small_pieces import cut_small
+
+Recording = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]
+SIGN = "is the torque's sign reversed, are the channels swapped?"
+
+
+def reversed_sign() -> Recording:
+    rig = tvident.simulate_torsional_rig(duration=60.0)
+    return rig.angle, -rig.torque
+
+
+def swapped() -> Recording:
+    rig = tvident.simulate_torsional_rig(duration=20.0)
+    return rig.torque, rig.angle
+
+
+def told_by(angle: Any, torque: Any, folder: Path, **call: Any) -> tvident.FileIdentification:
+    np.save(folder / "run.npy", np.stack([angle, torque], axis=1))
+    return tvident.identify_file(
+        folder / "run.npy", folder / "out.npy", angle="0", torque="1", **{"sample_rate": 1000.0} | call
+    )
+
+
+@pytest.mark.parametrize("call", [{}, {"method": "paper"}], ids=str)
+@pytest.mark.parametrize("is_cut", [False, True])
+def test_a_sign_that_no_machine_has_comes_with_its_cure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: dict[str, Any], is_cut: bool
+) -> None:
+    """In strong form a file had the verdict alone."""
+    if is_cut:
+        cut_small(monkeypatch, tmp_path)
+    found = told_by(*reversed_sign(), tmp_path, **call)
+    assert found.verdict == "do not trust: inertia is negative; see what to do"
+    assert sum(SIGN in line for line in found.advice) == 1
+    assert f"- {next(line for line in found.advice if SIGN in line)}" in found.summary()
+
+
+def test_what_nothing_explains_is_to_be_looked_at_in_memory(tmp_path: Path) -> None:
+    found = told_by(*swapped(), tmp_path, method="paper")
+    assert found.verdict.startswith("do not trust: ")
+    assert found.verdict.endswith("see what to do")
+    assert "identify a stretch of it in memory" in found.advice[0]
+
+
+def jittering_sweep(rate: float) -> Recording:
+    """Return a sweep at which inertia and stiffness trade places, whose stiffness has both signs."""
+    generator = np.random.default_rng(0)
+    duration, frequency, inertia = 40.0, 4.0, 0.01
+    time = np.arange(int(duration * rate)) / rate
+    speed = 2 * np.pi * frequency
+    torque = chirp(time, 0.1 * frequency, duration, 5 * frequency, method="logarithmic")
+    angle = lsim(([1.0], [inertia, 0.2 * inertia * speed, inertia * speed**2]), torque, time)[1]
+    angle = np.interp(time + 0.6 / rate * generator.uniform(-0.5, 0.5, time.size), time, angle)
+    angle += 1e-4 * angle.std() * generator.standard_normal(time.size)
+    return angle, torque + 1e-3 * generator.standard_normal(time.size)
+
+
+def of_both_signs(rate: float) -> Recording:
+    """Return a broad motion of a stiffness that has both signs."""
+    generator = np.random.default_rng(0)
+    time = np.arange(10_000) / rate
+    speeds = 2 * np.pi * generator.uniform(0.3, 20, (25, 1))
+    phases = speeds * time + generator.uniform(0, 2 * np.pi, (25, 1))
+    sizes = 1 / (1 + (speeds / 6 / np.pi) ** 2)
+    motion = np.sin(phases), speeds * np.cos(phases), -(speeds**2) * np.sin(phases)
+    angle, velocity, acceleration = ((sizes * part).sum(0) for part in motion)
+    torque = 0.01 * acceleration + 0.05 * velocity + (3 + 8 * np.sin(0.4 * np.pi * time)) * angle
+    angle += 1e-4 * angle.std() * generator.standard_normal(time.size)
+    return angle, torque + 1e-3 * torque.std() * generator.standard_normal(time.size)
+
+
+@pytest.mark.parametrize(("record", "is_trusted"), [(jittering_sweep, False), (of_both_signs, True)])
+def test_a_stiffness_of_both_signs_is_judged_as_in_memory(
+    tmp_path: Path, record: Callable[[float], Recording], is_trusted: bool
+) -> None:
+    angle, torque = record(500.0)
+    in_memory = tvident.identify(angle, torque, sample_rate=500.0).summary().splitlines()[0]
+    of_file = told_by(angle, torque, tmp_path, sample_rate=500.0).verdict
+    for verdict in (in_memory, of_file):
+        assert verdict.startswith("K(t) known to" if is_trusted else "do not trust: stiffness has both signs (")
+
+
+def test_a_doubtful_unit_is_shown_as_it_is_written(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("angle_rev,torque\n1,2\n2,3\n3,5\n")
+    with pytest.raises(ValueError, match="got 'rev': rev for revolutions"):
+        tvident.identify_file(path, tmp_path / "out.csv", angle="angle", torque="torque", sample_rate=1000.0)
