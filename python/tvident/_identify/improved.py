@@ -18,7 +18,7 @@ from tvident._identify.data import Data, cut
 from tvident._identify.free_offset import without_worse_offset
 from tvident._identify.left_over import unexplained
 from tvident._identify.methods import StrongForm, WeakForm
-from tvident._identify.offered import BEYOND_CHANCE, NEXT_TO_NOTHING, contradicted
+from tvident._identify.offered import BEYOND_CHANCE, NEXT_TO_NOTHING, contradicted, is_right
 from tvident._identify.remedies import Trial
 from tvident._identify.settings import Request, resolve
 from tvident._identify.signals import with_own_step
@@ -252,11 +252,6 @@ def _busiest(data: Data, length: int) -> slice:
     return slice(first, first + length)
 
 
-def _is_right(found: Identification) -> bool:
-    """Return whether inertia, damping and stiffness are positive beyond chance."""
-    return all(one.value > BEYOND_CHANCE * one.stderr for one in map(found.value, COEFFICIENTS))
-
-
 @np.errstate(all="ignore")  # of what is beyond doubles nothing is told
 def _takes_work(data: Data) -> bool:
     """Return whether the torque does work on the motion beyond chance: with the channels exchanged damping would be negative.
@@ -295,6 +290,9 @@ class Improvement(_AskedOfRecord):
         advice, suspects = exchanged if remedy is None else remedy.words, self._suspects
         if advice is None and (undoubted := trial.undoubted(self._undoubted)):
             suspects, advice = list(undoubted[0]), undoubted[1]
+        free = trial.set_free(remedy) if advice is not None and exchanged is None else None
+        if free is not None:
+            remedy, suspects, advice = free, self._suspects, free.words
         if advice is None:
             # Beside other advice this comes later.
             words = self._without_worse_offset(result, words)
@@ -393,12 +391,12 @@ class Improvement(_AskedOfRecord):
             if not unexplained(exchanged("constant", some)).share < 1:
                 return None
             found = exchanged("windowed", some)
-            if part is not None and _is_right(found):
+            if part is not None and is_right(found):
                 found = exchanged("windowed", channels)
         except ValueError:
             return None
         left = unexplained(found).share
-        if not (_is_right(found) and left <= NEXT_TO_NOTHING and left <= _MUCH_BETTER * unexplained(result).share):
+        if not (is_right(found) and left <= NEXT_TO_NOTHING and left <= _MUCH_BETTER * unexplained(result).share):
             return None
         return (
             f"are the channels of angle and torque swapped? With one in the other's place inertia, damping and stiffness are positive, "

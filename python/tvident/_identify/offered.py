@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tvident._arguments import with_error
-from tvident._equation import BUILT_IN
+from tvident._equation import BUILT_IN, COEFFICIENTS
 from tvident._results import BECOMES, OF_WEAK_FORM, Identification, median_of
 from tvident._status import DOUBTFUL_RECORD, Status
 
@@ -115,6 +115,11 @@ def feeds_energy(found: Identification) -> bool:
         if value < -BEYOND_CHANCE * error:
             return True
     return False
+
+
+def is_right(found: Identification) -> bool:
+    """Return whether inertia, damping and stiffness are positive beyond chance."""
+    return all(one.value > BEYOND_CHANCE * one.stderr for one in map(found.value, COEFFICIENTS))
 
 
 def holds(share: float, flags: int) -> bool:

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from tvident._arguments import with_error
+from tvident._arguments import listed, with_error
 from tvident._equation import COEFFICIENTS
 from tvident._identify.beside_changes import BesideChanges
 from tvident._identify.growths import GROWTHS
 from tvident._identify.left_over import AS_GOOD
 from tvident._identify.offered import BEYOND_CHANCE, MATTERS, Remedy, are_distinguished, can_be, holds, is_told
-from tvident._identify.tried_record import BETTER, WORTH, Call
+from tvident._identify.tried_record import BETTER, CONTRADICTED, WORTH, Call
 from tvident._status import DOUBTFUL_RECORD, Status
 
 _NOTHING = 1.05
@@ -42,6 +42,30 @@ class Trial(BesideChanges):
         tried = [one for one in (steady, of_constants, beside) if one is not None]
         least = min((one.ratio for one in tried), default=np.inf)
         return next((one for one in tried if one.ratio <= AS_GOOD * least), None)
+
+    def set_free(self, remedy: Remedy | None) -> Remedy | None:
+        """Return to let change what was given as constant and is not, where that explains more than what else would; None elsewhere.
+
+        Whatever is missing takes a part of what such a parameter does: a preload that of a stiffness that steps.
+        """
+        names = [name for name in COEFFICIENTS if isinstance(self.given[name], str) and self.given[name] == "constant"]
+        names_a_term = remedy is None or "terms=" in remedy.words
+        if not (names and names_a_term and self.result.record_status & Status.KIND_CONTRADICTED):
+            return None
+        kinds = {name: "windowed" if name == "stiffness" else "auto" for name in names}
+        free = self._tried({**self.given, **kinds}, {"terms": self.terms, "lag": self.result.settings["lag"]})
+        if free is None or free.record_status & CONTRADICTED or self._feeds_energy(free):
+            return None
+        left = self._left_of(free)
+        changing = [name for name in names if free.settings["kinds"][name] != "constant"]
+        if not (changing and left.ratio <= BETTER * (1 if remedy is None else remedy.ratio)):
+            return None
+        was, change = "was" if len(changing) == 1 else "were", ", ".join(f"{name}={kinds[name]!r}" for name in changing)
+        said = (
+            f"{listed(changing)} {was} given as constant, but what changes explains more than any term that may be missing: try "
+            f"{change}; {left}{self._moved(free, is_more=False)}"
+        )
+        return Remedy(left.ratio, said, distinguishes=False, share=left.least.share)
 
     def _of_constants(self, call: Call) -> Remedy | None:
         """Return which suspects, or which stiffness of none, explain more where everything is constant."""
