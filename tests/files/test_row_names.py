@@ -75,3 +75,22 @@ def test_commas_that_may_be_decimal_signs_are_refused_as_before(tmp_path: Path) 
     (tmp_path / "x.csv").write_text("angle,torque\n1,5,2\n2,5,3\n3,5,4\n")
     with pytest.raises(recordings.FileError, match="nobody can tell which is which"), warnings.catch_warnings():
         recordings.read(tmp_path / "x.csv")
+
+
+def test_units_below_names_without_one_of_the_times_are_no_names(tmp_path: Path) -> None:
+    """A dynamometer's channels were called (N-M) and (DEGREES), in N m and rad whatever stood there, without times."""
+    lines = [
+        f"{place:9d} {place % 7 + 0.5:9.5f} {place % 9 + 0.5:10.5f} {place % 5 + 90.5:9.4f}" for place in range(50)
+    ]
+    header = [
+        "Raw Data",
+        "Subject: X",
+        "",
+        "     mSec    Torque  Position       POS",
+        "           (FT-LBS)  (DEGREES)   (ANAT)",
+    ]
+    path = tmp_path / "biodex.txt"
+    path.write_text("\n".join([*header, *lines]) + "\n")
+    found = tvident.read_recording(path)
+    assert found.sample_rate == 1000
+    assert (found["Torque"].unit, found["Position"].unit) == ("FT-LBS", "DEGREES")

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from tvident._files.cells import Separator, are_joined, is_present, is_remark, number, split, without_comment
 from tvident._files.channels import FileError, Say
-from tvident._files.lone_time import with_lone_time
+from tvident._files.lone_time import with_lone_time, with_unit_of_times
 from tvident._files.names import listed, printable
 from tvident._files.oscilloscopes import names_of_keys
 from tvident._files.row_names import have_row_names
@@ -137,7 +137,8 @@ class Names:
         self.say = say
         self.most = len(cells)
         self.least = max(index for index, cell in enumerate(cells) if cell) + 1
-        self.above = with_lone_time(_without_keys(above, self.most))
+        lines = with_lone_time(_without_keys(above, self.most))
+        self.above = lines if separator is not None else with_unit_of_times(lines, self.most)
 
     def found(self, numbers: Sequence[tuple[int, str]]) -> list[str] | None:
         """Return the names of columns, which differ, or None where the file has none; lines of numbers come with their place."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol, TypeVar
 
 from tvident._arguments import is_called_time
-from tvident._units import is_unit, named_unit
+from tvident._units import ROTARY, is_convertible, is_unit, named_unit, unit_of
 
 
 class Cells(Protocol):
@@ -36,6 +36,22 @@ def with_lone_time(above: Sequence[AnyCells]) -> list[AnyCells]:
     if _is_lone(others[-1]) and len(last.cells) > 1 and not last.cells[0]:
         last.cells[0] = others[-1].cells[0]
         return [*others[:-1], last]
+    return lines
+
+
+def with_unit_of_times(above: Sequence[AnyCells], columns: int) -> list[AnyCells]:
+    """Return lines above columns that blanks separate, in which units without one of the times stand below the other names.
+
+    The times say their unit by their name (``mSec``), as dynamometers write them, or have none.
+    """
+    lines = list(above)
+    if len(lines) < 2 or len(lines[-1].cells) != columns - 1 or len(lines[-2].cells) != columns:  # noqa: PLR2004 - names and units
+        return lines
+    units, first = lines[-1].cells, lines[-2].cells[0]
+    is_time = is_called_time(named_unit(first)[0]) or is_convertible(ROTARY, "time", first)
+    if is_time and sum(unit_of(cell) is not None for cell in units) * 2 > len(units):
+        units.insert(0, "")
+        lines[-1].width = max(lines[-1].width, columns)
     return lines
 
 
