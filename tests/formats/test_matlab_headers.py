@@ -163,3 +163,24 @@ def test_units_are_found_whatever_their_capitals(
 ) -> None:
     """Degrees were rad without a word."""
     assert units_in(tmp_path / "x.mat", content) == expected
+
+
+def test_units_of_a_time_series_lie_beside_its_samples(tmp_path: Path) -> None:
+    """Structures of time series had angles in rad, whatever DataInfo said, and no clock in ms."""
+    time = np.arange(ANGLE.size)[:, None]
+    content = {
+        name: {
+            "Time": time,
+            "Data": samples[:, None],
+            "DataInfo": {"Units": UNITS[name], "Interpolation": 1.0},
+            "TimeInfo": {"Units": "milliseconds"},
+        }
+        for name, samples in BOTH.items()
+    }
+    clocks = dict.fromkeys(("logs.angle.Time", "logs.torque.Time"), "milliseconds")
+    assert units_in(tmp_path / "run.mat", {"logs": content}) == {
+        "logs.angle": "deg",
+        "logs.torque": "Nmm",
+        **clocks,
+    }
+    assert tvident.read_recording(tmp_path / "run.mat").sample_rate == pytest.approx(1000)

@@ -218,8 +218,20 @@ def _with_unit(name: str, unit: Any) -> str:
     return f"{name} [{unit}]" if isinstance(unit, str) and unit else name
 
 
+def _of_time_series(fields: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return a time series without what lies beside its samples and times, of which their units are taken."""
+    about = {name: fields[f"{name}Info"] for name in ("Data", "Time") if isinstance(fields.get(f"{name}Info"), Mapping)}
+    if not about or not {"Data", "Time"} <= fields.keys():
+        return fields
+    units = {name: str(one["Units"]).strip() for name, one in about.items() if isinstance(one.get("Units"), str)}
+    plain = {name: value for name, value in fields.items() if name not in {"DataInfo", "TimeInfo", "Time"}}
+    time = _with_unit("Time", units.get("Time", ""))
+    return {"unit": units.get("Data", ""), **plain, time: fields["Time"]}
+
+
 def _one_channel(fields: Mapping[str, Any]) -> tuple[Any, str, Mapping[str, Any]] | None:
     """Return the samples and the unit of a structure that holds these, and the numbers beside them."""
+    fields = _of_time_series(fields)
     lower = {str(name).lower(): value for name, value in fields.items()}
     values = [name for name in _VALUES if name in lower and not isinstance(lower[name], str | Mapping)]
     unit = next((lower[name] for name in _UNITS if isinstance(lower.get(name), str)), None)
