@@ -371,6 +371,27 @@ def test_an_outlet_that_begins_again_keeps_its_channels_or_is_refused(labels: li
             come(second, 300)
 
 
+@pytest.mark.slow
+def test_an_outlet_that_goes_without_a_source_ends_the_session_with_a_word() -> None:
+    """It ended as if all had come."""
+    pylsl = pytest.importorskip("pylsl")
+    name = f"tvident-gone-{os.getpid()}"
+    info = pylsl.StreamInfo(name, "Rig", 2, 1000.0, pylsl.cf_double64, "")
+    info.set_channel_labels(["angle", "torque"])
+    outlet = pylsl.StreamOutlet(info)
+    command = [sys.executable, "-m", "tvident", "live", "--lsl", name, "--angle", "angle", "--torque", "torque"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as program:
+        while not outlet.have_consumers():
+            time.sleep(0.02)
+        for _ in range(30):
+            outlet.push_sample([1.0, 2.0])
+        time.sleep(1.0)
+        del outlet
+        _, words = program.communicate(timeout=60)
+    assert "the outlet went, and the session with it: give the outlet a source_id" in words
+    assert program.returncode == 0
+
+
 def test_silence_and_a_stream_that_is_its_own_input_are_said() -> None:
     command = [sys.executable, "-m", "tvident", "live", "--angle", "0", "--torque", "1", "--sample-rate", "1000"]
     with subprocess.Popen(

@@ -123,6 +123,11 @@ def _say_read(source: Inlet | Lines, empty: int) -> None:
         )
     if source.restarts:
         click.echo(f"the outlet began again {source.restarts} times: no window goes over that", err=True)
+    if isinstance(source, Inlet) and source.has_gone:
+        click.echo(
+            "the outlet went, and the session with it: give the outlet a source_id, by which one that begins again is found",
+            err=True,
+        )
     if (missing := empty - source.unreadable - source.restarts) > 0:
         click.echo(f"{missing} samples came without an angle or a torque and count as missing", err=True)
     if not source.read and has_lines:

@@ -59,6 +59,8 @@ class Inlet:
         One of them.
     restarts : int
         How often an outlet of the same source began again, where one missing sample keeps windows apart.
+    has_gone : bool
+        Whether the outlet went, and nothing says which other one goes on: it has no source_id.
     """
 
     def __init__(self, name: str, names: Sequence[str], timeout: float = 10.0) -> None:
@@ -84,6 +86,7 @@ class Inlet:
         self._lost, self._late = pylsl.util.LostError, pylsl.util.TimeoutError
         self.read = self.unreadable = self.restarts = 0
         self.first_unreadable = ""
+        self.has_gone = False
         try:
             info = self._inlet.info(timeout=timeout)
         except (self._lost, self._late):
@@ -109,6 +112,7 @@ class Inlet:
                     self.restarts += 1
                 ahead = self._to_our_clock() if stamps else 0.0
             except self._lost:
+                self.has_gone = True
                 return
             rows = [[stamp + ahead, *self._numbers(sample)] for sample, stamp in zip(samples, stamps, strict=True)]
             if again:
