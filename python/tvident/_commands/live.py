@@ -177,9 +177,9 @@ def _run(
                 is_silent = True
                 click.echo(f"nothing has come for {_SILENT:g} s; waiting for more; Ctrl-C ends", err=True)
             session.take(piece, has_counter=has_counter)
-            if not is_said and session.clock.comes_faster:
+            if not is_said and (warning := session.clock.warning):
                 is_said = True
-                click.echo(f"Warning: {session.clock.comes_faster}", err=True)
+                click.echo(f"Warning: {warning}", err=True)
             if is_interrupted():
                 click.echo("ended by Ctrl-C", err=True)
                 break

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tvident._live.clock import LiveClock, Row
+from tvident._live.clock import LiveClock
+from tvident._live.rate import Row
 from tvident._stream import IdentificationStream, StreamedIdentification
 
 Show = Callable[[Sequence[float], dict[str, npt.NDArray[Any]]], None]

@@ -1,0 +1,141 @@
+"""What the clock of a live recording has found, and how it is said."""
+
+from __future__ import annotations
+
+import math
+
+from tvident._live.rate import Rate
+
+NO_MISTAKE = 0.1
+"""How far a period may be from the nominal one without being a mistake."""
+
+_ENOUGH, _MOST_REPEATED, _FASTER = 200, 0.1, 1.1
+"""Stamps that say at which rate they come, the part of them that may come twice, and how much faster than nominal they may be then."""
+
+_WHOLE = 0.05
+"""Periods by which a longer period is no whole number of them, at least, where no other samples can be missing."""
+
+_FEW = 32
+"""Buffers, or samples, that say how far a rate is off, at least."""
+
+_NOTABLE = 1e-3
+"""Of the rate: inertia goes with its square."""
+
+
+class ClockCounts:
+    """Counts what a clock finds.
+
+    Parameters
+    ----------
+    period : float
+        Nominal seconds from sample to sample.
+
+    Attributes
+    ----------
+    rate : Rate
+        Since the clock was set.
+    lost, repeated, jumps, back, twice, empty, unsure : int
+        Samples that did not come and that came twice or too late, how often clock or counter were set, stamps that are before the last
+        one by half a period or more, samples that were left out since they came twice with their stamps, that came without a number, and
+        that were left out since they may be from before a loss.
+    """
+
+    def __init__(self, period: float) -> None:
+        self._period = self._other = period
+        """Nominal, and what stamps show where the nominal one is a mistake."""
+        self.rate = Rate()
+        self._counter: int | None = None
+        self._begin = self._newest = math.nan
+        self._came = self._stamped = self._same = self._of_earlier_clock = 0
+        self._has_buffers = False
+        self.lost = self.repeated = self.jumps = self.back = self.twice = self.empty = self.unsure = 0
+
+    @property
+    def comes_faster(self) -> str:
+        """What to say where stamps show a higher rate than the nominal one, by which samples seem to come twice; nothing elsewhere."""
+        # Lines that come again are no samples, but those of one buffer may be equal where nothing moves.
+        if self._other < (1 - NO_MISTAKE) * self._period:
+            return self._must_be(f"{1 / self._other:.4g}", "parameters are wrong")
+        stamped = self._stamped - (0 if self._has_buffers else self._same)
+        repeated = self.repeated - self._of_earlier_clock
+        if stamped < _ENOUGH or repeated < _MOST_REPEATED * stamped or self._newest <= self._begin:
+            return ""
+        rate = (stamped - 1) / (self._newest - self._begin)
+        return "" if rate < _FASTER / self._period else self._must_be(f"{rate:.7g}", "parameters are wrong")
+
+    @property
+    def comes_slower(self) -> str:
+        """What to say where stamps show a lower rate than the nominal one, by which samples seem to be lost; nothing elsewhere."""
+        periods = self._other / self._period
+        if periods < 1 + NO_MISTAKE or abs(periods - round(periods)) < _WHOLE:
+            return ""
+        return self._must_be(f"{1 / self._other:.4g}", "samples are up to half a step from their times")
+
+    def _must_be(self, rate: str, but: str) -> str:
+        nominal = 1 / self._period
+        return f"samples must come at the nominal rate; stamps show {rate} Hz, not {nominal:.6g}: {but}; give --sample-rate {rate}"
+
+    @property
+    def differs(self) -> str:
+        """What to say where the rate is not the nominal one by more than clocks are; nothing elsewhere."""
+        period, error = self.rate.period, self.rate.error
+        drift = self._period / period - 1 if period > 0 else math.nan
+        if not (self.rate.count >= _FEW and abs(drift) > max(_NOTABLE, 3 * error / period)):
+            return ""
+        return f"the rate differs by {100 * drift:+.2g} %: inertia is off by twice that; give --sample-rate {1 / period:.7g}"
+
+    @property
+    def warning(self) -> str:
+        """What must be said while the session runs."""
+        return self.comes_faster or self.comes_slower or self.differs
+
+    def words(self) -> list[str]:
+        """Return what there is to say of the clock."""
+        said = [*self._rate_words(), *self._loss_words()]
+        if self.twice:
+            said.append(f"{self.twice} samples came twice, with the same stamp and the same values: left out")
+        if self.repeated:
+            said.append(
+                f"{self.repeated} samples more came than their stamps or numbers have room for: repeated, late, or of another rate"
+            )
+        if self.back:
+            said.append(
+                f"{self.back} stamps are before the one that came last: samples are out of order, or the clock was set"
+            )
+        if self.jumps:
+            said.append(f"the counter or clock jumped {self.jumps} times: no window goes over that")
+        return said
+
+    def _rate_words(self) -> list[str]:
+        """Return what there is to say of the rate."""
+        nominal, period, error = 1 / self._period, self.rate.period, self.rate.error
+        other = self.comes_faster or self.comes_slower
+        if not (math.isfinite(period) and period > 0 and math.isfinite(error)):
+            return [f"rate: {nominal:.6g} Hz nominal; no stamps to compare it with"]
+        if other:
+            return [f"rate: {other}"]
+        drift, of_drift = (self._period / period - 1) * 1e6, error / period * 1e6
+        said = [
+            f"rate: {nominal:.6g} Hz nominal, {1 / period:.7g} Hz effective; drift {drift:+.1f} ± {of_drift:.1f} ppm"
+        ]
+        said += [self.differs] if self.differs else []
+        return said
+
+    def _loss_words(self) -> list[str]:
+        """Return what there is to say of samples that did not come."""
+        if not self._stamped and self._counter is None:
+            return [
+                "lost samples: not known, since samples have neither stamps nor numbers; give --time or --counter if they have"
+            ]
+        if self.comes_slower:
+            return ["lost samples: not known at another rate than the nominal one"]
+        said = [f"lost samples: {self.lost}"]
+        if self.unsure:
+            said.append(
+                f"{self.unsure} samples of buffers before which samples were lost are left out: they may be from before the loss"
+            )
+        if self.lost > self._came:
+            said.append(
+                "more samples are missing than came: check the sample rate, and that times are in seconds or say their unit"
+            )
+        return said
