@@ -211,7 +211,8 @@ impl RowResults {
         self.status[row] & Status::INVALID.bits() == 0
     }
 
-    /// Where a jump may or may not have happened the values are the mean of both, and its spread is part of their errors.
+    /// Where a jump may or may not have happened the values are the mean of both, and its spread is part of their errors. Of the side that a sample is on
+    /// it has its value; the other is carried on from the last row beside the jump.
     fn blur(&self, jump: &Jump, samples: usize, step: usize, results: &mut SampleResults) {
         let rows = self.status.len();
         let exact = (jump.sample as f64 - self.first) / self.stride;
@@ -228,7 +229,8 @@ impl RowResults {
                 self.values.iter().zip(&self.slopes).zip(results.values.iter_mut().zip(&mut results.errors))
             {
                 let on = |row: usize| column[row] + (sample as f64 - self.at(row)) / self.stride * slopes[row];
-                let (left, right) = (on(after - 1), on(after));
+                let own = values[place];
+                let (left, right) = if sample < jump.sample { (own, on(after)) } else { (on(after - 1), own) };
                 values[place] = left + happened * (right - left);
                 errors[place] = errors[place].hypot((happened * (1.0 - happened)).sqrt() * (right - left));
             }
@@ -278,5 +280,45 @@ impl Place {
             return column[self.row];
         }
         column[self.row] + self.part * (column[self.next] - column[self.row])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::simulated::staged;
+
+    const ROWS: usize = 60;
+    const STRIDE: f64 = 10.0;
+
+    #[test]
+    fn where_a_jump_may_have_happened_the_side_that_a_sample_is_on_has_its_own_value() {
+        // A curve on both sides of a jump, whose growth is hardly known beside it.
+        let curve = |row: usize| if row < 30 { 1.0 } else { 2.0 + 0.01 * (row as f64 - 30.0) };
+        let slope = |row: usize| if row == 30 { 0.5 } else { 0.0 };
+        let happened: Vec<f64> = (0..200).map(|place| f64::from(place) / 199.0).collect();
+        let column = |of: fn(usize) -> f64| vec![(0..ROWS).map(of).collect::<Vec<f64>>()];
+        let results = RowResults {
+            first: 5.0,
+            stride: STRIDE,
+            values: vec![(0..ROWS).map(curve).collect()],
+            slopes: vec![(0..ROWS).map(slope).collect()],
+            errors: column(|_| 0.1),
+            deviation: vec![0.0; ROWS],
+            condition: vec![1.0; ROWS],
+            status: vec![0; ROWS],
+            jumps: vec![Jump { sample: 300, first: 200, happened: happened.clone(), of_constants: false }],
+            ..RowResults::default()
+        };
+        let found = staged(|stages| results.at_samples(600, 1, stages));
+        let later = 375;
+        let (part, own) = (happened[later - 200], curve(37));
+        assert!((found.values[0][later] - (1.0 + part * (own - 1.0))).abs() < 1e-12, "{}", found.values[0][later]);
+        let spread = (part * (1.0 - part)).sqrt() * (own - 1.0);
+        assert!((found.errors[0][later] - 0.1_f64.hypot(spread)).abs() < 1e-12);
+        // Before it, what comes after is carried on from the first row behind it.
+        let (earlier, part) = (245, happened[45]);
+        let after = 2.0 + (245.0 - 305.0) / STRIDE * 0.5;
+        assert!((found.values[0][earlier] - (1.0 + part * (after - 1.0))).abs() < 1e-12);
     }
 }
