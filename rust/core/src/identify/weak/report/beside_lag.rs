@@ -39,7 +39,12 @@ impl Session<'_, '_, '_> {
         let mut found = if let Some(found) = self.beside_lag(problem, weak, decided, fit, errors)? {
             found
         } else {
-            let covariance = all.covariance(problem, &errors.covariance, &mut self.stages)?;
+            let mut covariance = all.covariance(problem, &errors.covariance, &mut self.stages)?;
+            if !has_variances(&covariance) {
+                // What few windows leave is not what noise of low frequencies is: they follow it. The noise of the channels is as large there as elsewhere.
+                let of_channels = decided.covariance.clone().with_variance(errors.covariance.variance());
+                covariance = all.covariance(problem, &of_channels, &mut self.stages)?;
+            }
             BesideLag { covariance, untold: None, of_steps: 0.0 }
         };
         for entry in &mut found.covariance {
@@ -91,5 +96,22 @@ impl Session<'_, '_, '_> {
         let changes: Vec<f64> = (0..wanted).map(change).collect();
         let untold = Some(changes).filter(|all| seconds > 0.0 && all.iter().all(|one| one.is_finite()));
         Ok(Some(BesideLag { covariance, untold, of_steps }))
+    }
+}
+
+/// Whether a covariance says how much each constant is known.
+fn has_variances(covariance: &[f64]) -> bool {
+    let count = covariance.len().isqrt();
+    (0..count).all(|one| covariance[one * (count + 1)] >= 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::has_variances;
+
+    #[test]
+    fn a_variance_is_never_negative() {
+        assert!(has_variances(&[1.0, -2.0, -2.0, 0.0]) && has_variances(&[]));
+        assert!(!has_variances(&[1.0, 0.0, 0.0, -1e-9]) && !has_variances(&[f64::NAN]));
     }
 }
