@@ -288,6 +288,8 @@ def test_what_is_shown_by_itself_waits_for_no_trial(rig: tvident.Recording) -> N
         assert "unflagged, summary() has the verdict" in repr(one)
         assert "result.summary() says what to do" in one._repr_html_()
         assert "trusted" not in one.columns(judged=False)
+        with pytest.raises(TypeError, match="judged must be True or False"):
+            one.columns(judged=np.array([1, 2]))
     assert not tried
     verdict = result.summary().splitlines()[0].removeprefix("do not trust: ").split(";")[0]
     assert len(tried) == 1

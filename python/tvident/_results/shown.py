@@ -78,6 +78,8 @@ class Shown(Simulated, Telling, Valued):
         ------
         ValueError
             If there are several records.
+        TypeError
+            If `judged` is neither True nor False.
 
         See Also
         --------
@@ -88,7 +90,7 @@ class Shown(Simulated, Telling, Valued):
             raise ValueError(
                 f"only a single record has columns; this one has shape {self.inertia.shape}; take one record"
             )
-        return {"time": self.time, **self._columns(judged=judged)}
+        return {"time": self.time, **self._columns(judged=arguments.flag("judged", judged))}
 
     @property
     def trusted(self) -> npt.NDArray[np.bool_]:
