@@ -90,3 +90,14 @@ def test_lists_of_one_length_and_structures_are_columns(tmp_path: Path) -> None:
     assert list(recording) == ["t", "q.0", "q.1", "joint.tau", "joint.inner.deep"]
     np.testing.assert_array_equal(recording["q.0"], RIG.angle)
     np.testing.assert_array_equal(recording["tau"], RIG.torque)
+
+
+@pytest.mark.parametrize("name", ["q_deg", "q [deg]"])
+@pytest.mark.filterwarnings("ignore:.*one of them part of a structure")
+def test_a_part_of_a_structure_beside_a_column_of_its_name_keeps_its_unit(tmp_path: Path, name: str) -> None:
+    """The number behind a name stood behind its unit, too: of `joint.q_deg_2` nothing said that it is in degrees."""
+    inside = pa.StructArray.from_arrays([pa.array(DEGREES)], names=[name])
+    table = pa.table({"time": TIME, f"joint.{name}": DEGREES, "joint": inside})
+    parquet.write_table(table, tmp_path / "run.parquet")
+    recording = tvident.read_recording(tmp_path / "run.parquet")
+    assert recording.units == {"time": "", "joint.q": "deg", "joint.q_2": "deg"}

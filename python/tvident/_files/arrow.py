@@ -12,7 +12,7 @@ import numpy as np
 from tvident._files.arrow_names import NO_NAME, flat_columns, named_field, units_of_table
 from tvident._files.channels import Channels, FileError, Say, check_count
 from tvident._files.names import listed, printable
-from tvident._units import named_unit, with_unit
+from tvident._units import named_unit, with_ending, with_unit
 
 
 def read_arrow(path: Path, say: Say) -> Channels:
@@ -59,7 +59,9 @@ def read_arrow(path: Path, say: Say) -> Channels:
 
 def _of_its_own(name: str, others: set[str], say: Say) -> str:
     """Return a name that no other has, and keep it: structures beside columns may have parts that are called as these are."""
-    unique = next(one for one in chain([name], (f"{name}_{count}" for count in count_from(2))) if one not in others)
+    unique = next(
+        one for one in chain([name], (with_ending(name, f"_{count}") for count in count_from(2))) if one not in others
+    )
     if unique != name:
         say(
             f"two columns are called '{printable(name, 40)}', one of them part of a structure: the later one is "

@@ -7,12 +7,11 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from tvident._files.channels import WIDEST_LIST
+
 _UNITS = ("units", "unit")
 _PANDAS = b"PANDAS_ATTRS"
 """Where pandas keeps the attributes of a table."""
-
-_WIDEST = 64
-"""Numbers of a list that are columns of their own."""
 
 NO_NAME = "__index_level_0__"
 """What pandas calls an index without a name."""
@@ -92,4 +91,4 @@ def _width(pa: Any, column: Any) -> int:
     import pyarrow.compute as pc  # noqa: PLC0415 - an extra
 
     widths = pc.unique(pc.list_value_length(column)).to_pylist()
-    return int(widths[0]) if len(widths) == 1 and 0 < widths[0] <= _WIDEST else 0
+    return int(widths[0]) if len(widths) == 1 and 0 < widths[0] <= WIDEST_LIST else 0

@@ -36,6 +36,8 @@ Examples
 Say = Callable[[str], None]
 """Takes in what is not read, or not as it stands in the file."""
 
+WIDEST_LIST = 64
+"""Numbers of a list in a cell that are channels of their own."""
 
 _NUMBER = re.compile(r"[0-9]{1,9}")
 

@@ -11,7 +11,16 @@ from tvident._files.lone_time import with_lone_time, with_unit_of_times
 from tvident._files.names import listed, printable
 from tvident._files.oscilloscopes import names_of_keys
 from tvident._files.row_names import have_row_names
-from tvident._units import ROTARY, is_convertible, is_unit, named_unit, unit_of, with_unit, without_brackets
+from tvident._units import (
+    ROTARY,
+    is_convertible,
+    is_unit,
+    named_unit,
+    unit_of,
+    with_ending,
+    with_unit,
+    without_brackets,
+)
 
 CURE = "export the channels as columns of numbers with a point as the decimal sign"
 
@@ -313,7 +322,7 @@ class Names:
             unique, count = bare, 1
             while unique in found or (count > 1 and unique in given):
                 count += 1
-                unique = _numbered(bare, count)
+                unique = with_ending(bare, f"_{count}")
             if count > 1:
                 again.append(f"column {index} is called {printable(unique, 40)}")
             found[unique] = None
@@ -400,12 +409,6 @@ def _completed(names: list[str], others: Sequence[Sequence[str]]) -> list[str]:
 def _differ(cells: Sequence[str]) -> bool:
     """Return whether no two of the cells that hold something are equal."""
     return len({cell for cell in cells if cell}) == sum(map(bool, cells))
-
-
-def _numbered(name: str, count: int) -> str:
-    """Return a name with a number, in front of its unit."""
-    bare, unit = named_unit(name)
-    return with_unit(f"{bare}_{count}", unit) if unit else f"{name}_{count}"
 
 
 def _are_units(cells: Sequence[str]) -> bool:

@@ -9,9 +9,9 @@ from itertools import islice
 from typing import TextIO, cast
 
 from tvident._files.cells import split
-from tvident._files.channels import Say
+from tvident._files.channels import WIDEST_LIST, Say
 from tvident._files.names import listed, printable
-from tvident._units import named_unit, with_unit
+from tvident._units import with_ending
 
 _NUMBER = r"(?:[+-]?(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?|nan|NaN|None|null)"
 _BETWEEN = r"(?:\s*+[,;]\s*+|\s++)"
@@ -26,8 +26,8 @@ _LIST = re.compile(
 _SPLIT = re.compile(r"[,;\s]+")
 _NOTHING = frozenset(("None", "null"))
 
-_LINES, _WIDEST = 200, 64
-"""Lines in which the first list is looked for, and numbers of a list that are columns of their own."""
+_LINES = 200
+"""Lines in which the first list is looked for."""
 
 
 @dataclass(frozen=True)
@@ -63,15 +63,13 @@ class _Lists:
         many: list[str] = []
         for place, cell in enumerate(cells):
             count = self.widths.get(place, 0)
-            again = [_of_number(cell, one) if numbered and cell else cell for one in range(count)] if count else [cell]
+            again = (
+                [with_ending(cell, f".{one}") if numbered and cell else cell for one in range(count)]
+                if count
+                else [cell]
+            )
             many += [f'"{one}"' if self.separator in one else one for one in again]
         return self.separator.join(many)
-
-
-def _of_number(cell: str, place: int) -> str:
-    """Return the name of a number of a list, with the unit of the whole."""
-    bare, unit = named_unit(cell)
-    return with_unit(f"{bare}.{place}", unit) if unit and bare != cell else f"{cell}.{place}"
 
 
 class WithoutLists:
@@ -145,8 +143,9 @@ def _lists_in(lines: Sequence[str], place: int) -> tuple[_Lists | None, list[str
     cells = split(marked, separator)
     columns = [column for column, cell in enumerate(cells) if cell == "[]"]
     widths = [len(_SPLIT.split(one["square"] or one["round"])) for one in matches]
-    if len(columns) != len(widths) or max(widths) > _WIDEST:
+    if len(columns) != len(widths) or max(widths) > WIDEST_LIST:
         return None, []
-    above = next((split(line, separator) for line in lines[:place] if len(split(line, separator)) == len(cells)), [])
+    rows = (split(line, separator) for line in lines[:place])
+    above = next((row for row in rows if len(row) == len(cells)), [])
     names = [above[column] if above else str(column) for column in columns]
     return _Lists(separator, len(cells), dict(zip(columns, widths, strict=True))), names

@@ -9,7 +9,7 @@ from tvident._units.channel import (
     unit_named,
     unit_said,
 )
-from tvident._units.names import derivative_units, named_unit, with_unit
+from tvident._units.names import derivative_units, named_unit, with_ending, with_unit
 from tvident._units.parse import Unit, is_unit, unit_of, without_brackets
 from tvident._units.quantities import (
     LINEAR,
@@ -55,6 +55,7 @@ __all__ = [
     "unit_named",
     "unit_of",
     "unit_said",
+    "with_ending",
     "with_unit",
     "without_brackets",
 ]

@@ -130,3 +130,9 @@ def derivative_units(unit: str, count: int) -> list[str]:
 def with_unit(name: str, unit: str) -> str:
     """Return a name with a unit in brackets behind it, where there is one."""
     return f"{name} [{unit}]" if unit else name
+
+
+def with_ending(name: str, ending: str) -> str:
+    """Return a name with an ending, in front of its unit."""
+    bare, unit = named_unit(name)
+    return with_unit(f"{bare}{ending}", unit) if unit else f"{name}{ending}"
