@@ -35,10 +35,8 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
             if dataset.dtype.kind not in "biufc" and not dataset.dtype.names:
                 skipped.append(f"{cut(bare)} (no numbers)")
                 continue
-            try:
-                values = dataset[()]
-            except Exception as error:  # noqa: BLE001 - of one dataset; the others may be whole
-                skipped.append(f"{cut(bare)} ({in_words(error)})")
+            values = read_whole(bare, dataset, skipped)
+            if values is None:
                 continue
             skipped += _never_written(cut(bare), dataset)
             # A list of the columns may stand beside a matrix, as a dataset of its own.
@@ -65,6 +63,15 @@ def datasets(group: Any, prefix: str, h5py: Any) -> Iterator[tuple[str, Any]]:
                 yield prefix + name, one
             elif isinstance(one, h5py.Group):
                 yield from datasets(one, f"{prefix}{name}/", h5py)
+
+
+def read_whole(name: str, dataset: Any, skipped: list[str]) -> Any:
+    """Return what a dataset holds; None where it cannot be read, which is said: the others may be whole."""
+    try:
+        return dataset[()]
+    except Exception as error:  # noqa: BLE001 - whatever a damaged chunk or a filter that is not there raises
+        skipped.append(f"{cut(name)} ({in_words(error)})")
+        return None
 
 
 def _lists(found: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from tvident._formats.columns import UNITS, channels_of, first_of, rate_in
-from tvident._formats.hdf5 import datasets
-from tvident._formats.told import cut, in_words
+from tvident._formats.hdf5 import datasets, read_whole
+from tvident._formats.told import cut
 
 _SINCE = re.compile(r"\s*(\S+)\s+since\s.*", re.IGNORECASE | re.DOTALL)
 """How units of times tell since when they count, of which the unit is taken."""
@@ -57,10 +57,8 @@ def _of_version_4(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
             if dataset.shape is None or dataset.dtype.kind not in "biufc":
                 skipped.append(f"{cut(bare)} (no numbers)")
                 continue
-            try:
-                values = dataset[()]
-            except Exception as error:  # noqa: BLE001 - of one variable; the others may be whole
-                skipped.append(f"{cut(bare)} ({in_words(error)})")
+            values = read_whole(bare, dataset, skipped)
+            if values is None:
                 continue
             scales = [one[0] for one in dataset.dims if len(one)]
             beside = [one[()] for one in scales if one.dtype.kind in "OSU"]
