@@ -39,12 +39,7 @@ impl Session<'_, '_, '_> {
         let mut found = if let Some(found) = self.beside_lag(problem, weak, decided, fit, errors)? {
             found
         } else {
-            let mut covariance = all.covariance(problem, &errors.covariance, &mut self.stages)?;
-            if !has_variances(&covariance) {
-                // What few windows leave is not what noise of low frequencies is: they follow it. The noise of the channels is as large there as elsewhere.
-                let of_channels = decided.covariance.clone().with_variance(errors.covariance.variance());
-                covariance = all.covariance(problem, &of_channels, &mut self.stages)?;
-            }
+            let covariance = self.covariance_by_errors(problem, decided, all, errors)?;
             BesideLag { covariance, untold: None, of_steps: 0.0 }
         };
         for entry in &mut found.covariance {
@@ -53,7 +48,24 @@ impl Session<'_, '_, '_> {
         Ok(found)
     }
 
-    /// The same beside a lag, or `None` if none was sought or all is not determined beside it.
+    /// The covariance of the constants of a fit from what errors are made from. What few windows leave is not what noise of low frequencies is, for they
+    /// follow it: where that gives a negative variance, the noise of the channels is taken to be as large.
+    fn covariance_by_errors(
+        &mut self,
+        problem: &Problem<'_>,
+        decided: &Decided,
+        all: &Fit,
+        errors: &Errors,
+    ) -> Result<Vec<f64>, Error> {
+        let covariance = all.covariance(problem, &errors.covariance, &mut self.stages)?;
+        if has_variances(&covariance) {
+            return Ok(covariance);
+        }
+        let of_channels = decided.covariance.clone().with_variance(errors.covariance.variance());
+        all.covariance(problem, &of_channels, &mut self.stages)
+    }
+
+    /// The same as `covariance_of` beside a lag, or `None` if none was sought or all is not determined beside it.
     fn beside_lag(
         &mut self,
         problem: &Problem<'_>,
@@ -77,7 +89,7 @@ impl Session<'_, '_, '_> {
         let Some(all) = fit.again(&problem, errors.expected, self.options.instructions, &mut self.stages)? else {
             return Ok(None);
         };
-        let both = all.covariance(&problem, &errors.covariance, &mut self.stages)?;
+        let both = self.covariance_by_errors(&problem, decided, &all, errors)?;
         let moved = all.moved_by_rows(&problem, wanted..wanted + 1, &mut self.stages)?.swap_remove(0);
         let rate_column = Some(rows.regressors[rate].value.as_slice());
         let steps = self.by_steps(&moved, StepRows { weak, rate: rate_column, are_white: decided.white.is_some() });
