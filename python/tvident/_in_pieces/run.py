@@ -126,6 +126,9 @@ class Run:
             if self._report is not None:
                 self._report(piece[1], self._samples)
         self._asked.recording.check_unchanged()
+        if self._report is not None:
+            # While no other call may write: what is told may ask for one.
+            self._report.finish()
         return self._written(settings, work)
 
     def _keep(self, work: Work, columns: Columns, note: Any) -> None:

@@ -8,7 +8,7 @@ use tvident::Error;
 use tvident::auto_derivatives::{
     AutomaticEstimates as Slices, AutomaticOptions, AutomaticRecord, estimate_automatically as core_estimate,
 };
-use tvident::exec::{Watch, workers as threads};
+use tvident::exec::{part_of, workers as threads};
 use tvident::noise::{coloured_or_low_passed_noise, noise};
 use tvident::simd::Instructions;
 
@@ -80,7 +80,7 @@ pub(crate) fn estimate_automatically<'py>(
                         status: &mut flags,
                     };
                     let done = index * derivatives.len() + row;
-                    let mut watch = part_of(watch, done, units);
+                    let mut watch = part_of(watch, done * count..(done + 1) * count, units * count);
                     let pair = core_estimate(&prepared, &options, &mut estimates, threads(workers), &mut watch)?;
                     chosen[row].push(pair.map_or((0, 0), |pair| (pair.window_length, pair.order)));
                     for (status, flags) in status[own].iter_mut().zip(&flags) {
@@ -100,9 +100,4 @@ pub(crate) fn estimate_automatically<'py>(
         chosen,
         noise: noises,
     })
-}
-
-/// The watch of one of several equal parts of the work.
-fn part_of<'a>(watch: &'a mut Watch<'_>, done: usize, parts: usize) -> impl FnMut(usize, usize) -> bool + 'a {
-    move |now, total| watch(done * total + now, parts * total)
 }

@@ -5,4 +5,4 @@ pub(crate) mod memory;
 pub(crate) mod pool;
 pub(crate) mod stages;
 
-pub use pool::{Watch, workers};
+pub use pool::{Watch, part_of, workers};

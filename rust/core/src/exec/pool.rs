@@ -25,6 +25,19 @@ const WATCH: Duration = Duration::from_millis(20);
 /// cancels what is left.
 pub type Watch<'a> = dyn FnMut(usize, usize) -> bool + 'a;
 
+/// The watch of a part of the work: what it is told of its own is told as this part of the whole.
+pub fn part_of<'a>(
+    watch: &'a mut Watch<'_>,
+    part: Range<usize>,
+    whole: usize,
+) -> impl FnMut(usize, usize) -> bool + 'a {
+    move |done, total| {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the length of the part")]
+        let share = (part.len() as f64 * (done as f64 / total.max(1) as f64)) as usize;
+        watch(part.start + share, whole)
+    }
+}
+
 /// How many threads a request means: itself, or all processors that this process may use.
 #[must_use]
 pub fn workers(request: Option<NonZeroUsize>) -> NonZeroUsize {

@@ -12,6 +12,8 @@ pub(crate) struct Stages<'a, 'b> {
     watch: &'a mut Watch<'b>,
     /// The total that the watch is told.
     total: usize,
+    /// What it was told.
+    told: usize,
     /// Stages done, and the expected number of stages.
     done: usize,
     expected: usize,
@@ -19,7 +21,7 @@ pub(crate) struct Stages<'a, 'b> {
 
 impl<'a, 'b> Stages<'a, 'b> {
     pub(crate) fn new(workers: NonZeroUsize, total: usize, expected: usize, watch: &'a mut Watch<'b>) -> Self {
-        Self { workers, watch, total, done: 0, expected }
+        Self { workers, watch, total, told: 0, done: 0, expected }
     }
 
     /// Does every piece once and returns what each gave, in their order.
@@ -59,14 +61,44 @@ impl<'a, 'b> Stages<'a, 'b> {
         if (self.watch)(self.total, self.total) { Ok(()) } else { Err(Error::Cancelled) }
     }
 
-    /// Does one stage, of which the watch sees its share of the whole.
+    /// Does one stage, of which the watch sees its share of the whole. Work that begins anew within it is told as nothing new.
     pub(crate) fn stage<R>(&mut self, work: impl FnOnce(&mut Watch<'_>) -> Result<R, Error>) -> Result<R, Error> {
         let (total, expected, done) = (self.total, self.expected, self.done);
-        let watch = &mut *self.watch;
+        let (watch, told) = (&mut *self.watch, &mut self.told);
         let share = |part: f64| (total as f64 * ((done as f64 + part) / expected as f64).min(1.0)).floor();
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between zero and the total")]
-        let result = work(&mut |now, all| watch(share(now as f64 / all.max(1) as f64) as usize, total));
+        let result = work(&mut |now, all| {
+            *told = (*told).max(share(now as f64 / all.max(1) as f64) as usize);
+            watch(*told, total)
+        });
         self.done += 1;
         result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn progress_never_goes_back_where_a_stage_does_several_works() {
+        let mut told = Vec::new();
+        let mut watch = |done: usize, total: usize| {
+            told.push((done, total));
+            true
+        };
+        let mut stages = Stages::new(NonZeroUsize::MIN, 100, 4, &mut watch);
+        for _ in 0..6 {
+            let of_two_works = |watch: &mut Watch<'_>| {
+                for (done, total) in [(0, 7), (7, 7), (0, 3), (2, 3), (3, 3)] {
+                    assert!(watch(done, total));
+                }
+                Ok(())
+            };
+            assert_eq!(stages.stage(of_two_works), Ok(()));
+        }
+        assert_eq!(stages.finish(), Ok(()));
+        assert!(told.is_sorted());
+        assert_eq!((told[0], told.last()), ((0, 100), Some(&(100, 100))));
     }
 }

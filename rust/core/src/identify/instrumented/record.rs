@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 
 use crate::equation::motion::{Motion, unknowns};
 use crate::error::Error;
-use crate::exec::pool::Watch;
+use crate::exec::pool::{Watch, part_of};
 use crate::identify::identification::{Covariance, Identification, Unknown};
 use crate::identify::instrumented::constancy::tests;
 use crate::identify::instrumented::explained::explained;
@@ -51,7 +51,14 @@ pub fn identify_with_instruments(
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<(Identification, InstrumentTest)>, Error> {
-    tasks.iter().map(|(task, instrument)| one(task, *instrument, options, workers, watch)).collect()
+    let samples: usize = tasks.iter().map(|(task, _)| task.motion.angle.len()).sum();
+    let mut done = 0;
+    let each = tasks.iter().map(|(task, instrument)| {
+        let part = done..done + task.motion.angle.len();
+        done = part.end;
+        one(task, *instrument, options, workers, &mut part_of(watch, part, samples))
+    });
+    each.collect()
 }
 
 fn one(
