@@ -3,12 +3,8 @@
 pub(crate) mod passed_noise;
 pub(crate) mod resampling;
 pub(crate) mod shared_buffers;
-pub(crate) mod shared_choice;
-pub(crate) mod shared_factor;
-pub(crate) mod shared_sums;
 pub(crate) mod shared_windows;
 pub(crate) mod spline;
-pub(crate) mod table_columns;
 pub(crate) mod window_alone;
 pub(crate) mod window_estimates;
 pub(crate) mod window_fit;

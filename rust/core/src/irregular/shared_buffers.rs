@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use crate::irregular::shared_factor::SharedFactor;
-use crate::irregular::shared_sums::{ChebyshevSums, MOST, TakenOff};
 use crate::irregular::window_places::{PlacedWindow, WindowGroup};
+use crate::local_polynomials::chebyshev_factor::ChebyshevFactor;
+use crate::local_polynomials::chebyshev_sums::{ChebyshevSums, MOST, TakenOff};
+use crate::local_polynomials::kept_digits::tails_of;
 use crate::simd::aligned::{Aligned, OnLines};
 use crate::simd::vectors::{Lanes, MOST_LANES};
 
@@ -167,7 +168,7 @@ impl GroupSamples {
 
     /// Sums over each lane's first window, from which the polynomial that fits all of the group best was taken off.
     #[inline(always)]
-    pub(crate) fn begin<S: Lanes>(&mut self, simd: S, degrees: usize, factor: &mut SharedFactor<S>) -> SlidSums<S> {
+    pub(crate) fn begin<S: Lanes>(&mut self, simd: S, degrees: usize, factor: &mut ChebyshevFactor<S>) -> SlidSums<S> {
         // Up to the least of these, samples belong to the first window of every lane.
         let least = self.first[..S::F64_LANES].iter().copied().min().unwrap_or(0);
         let (first, all) = (counts(&self.first), counts(&self.all));
@@ -212,11 +213,7 @@ impl GroupSamples {
             }
         }
         let TakenOff { coefficients, products, square, .. } = off;
-        let (mut tails, mut size) = (OnLines([zero; MOST]), zero);
-        for k in (0..degrees.min(MOST)).rev() {
-            size = simd.add_f64s(size, simd.abs_f64s(coefficients.0[k]));
-            tails.0[k] = simd.mul_f64s(size, size);
-        }
+        let tails = tails_of(simd, degrees, &coefficients.0);
         SlidSums { left: ChebyshevSums { moments, products }, square, peak: square, level, energy, coefficients, tails }
     }
 }

@@ -2,31 +2,26 @@
 //!
 //! A group of windows (see [`crate::irregular::window_places`]) has one time from -1 to 1 and one polynomial that is taken off its samples, so that sums are
 //! as small as the noise and lose no digits to the motion. What a window's own fit adds to it, and what each order explains, follow from the factor of
-//! its normal matrix. A window for which that may lose more than [`LOST`] is left to a QR decomposition of its own.
+//! its normal matrix. A window for which that may lose more than [`LOST`](crate::local_polynomials::kept_digits::LOST) is left to a QR decomposition of its own.
 
 use std::array::from_fn;
 use std::ops::Range;
 
 use crate::irregular::shared_buffers::{GroupSamples, Moves, SlidSums};
-use crate::irregular::shared_choice::{OrderResiduals, OrderShares, SharedChoice, sums};
-use crate::irregular::shared_factor::SharedFactor;
-use crate::irregular::shared_sums::{DERIVATIVES, MOST, at};
-use crate::irregular::table_columns::TableColumns;
 use crate::irregular::window_estimates::{WindowFit, WindowFits};
 use crate::irregular::window_places::{Numbered, PlacedWindow, WindowGroup, WindowSpan};
 use crate::lanes::tile::{Tile, WindowFields};
+use crate::local_polynomials::chebyshev_factor::ChebyshevFactor;
+use crate::local_polynomials::chebyshev_sums::{DERIVATIVES, MOST, at};
+use crate::local_polynomials::kept_digits::KeptDigits;
 use crate::local_polynomials::options::Order;
 use crate::local_polynomials::order_table::OrderTable;
+use crate::local_polynomials::orders_abreast::{ChosenOrders, DerivativeParts, OrderResiduals, OrderShares, sums};
 use crate::local_polynomials::sliding_projection::ROUNDING;
+use crate::local_polynomials::table_columns::TableColumns;
 use crate::simd::aligned::OnLines;
 use crate::simd::vectors::{Kernel, Lanes, MOST_LANES};
 use crate::status::Status;
-
-/// What rounding may change of a residual sum of squares, at most, as a part of it.
-pub(crate) const LOST: f64 = 1e-8;
-
-/// The rounding of the polynomial that is taken off, at most, as a part of the residual sum of squares: where that is rounding itself, or nearly.
-const ROUNDED: f64 = 1e-6;
 
 /// Whether windows of so many candidates and derivatives from 0 on can share a basis.
 pub(crate) fn can_share(degrees: usize, derivatives: usize) -> bool {
@@ -57,7 +52,7 @@ impl Kernel for WindowsAbreast<'_, '_> {
         let mut work = Workspace {
             columns: TableColumns::new(S::F64_LANES),
             tile: Tile::new(self.fields().good + 1, S::F64_LANES, S::F64_LANES),
-            factor: SharedFactor::zero(simd),
+            factor: ChebyshevFactor::zero(simd),
             polynomials: OnLines([nothing.0; DERIVATIVES]),
             coefficients: nothing.clone(),
             left: nothing,
@@ -75,7 +70,7 @@ struct Workspace<S: Lanes> {
     columns: TableColumns,
     /// What was found in the last few windows of each lane.
     tile: Tile,
-    factor: SharedFactor<S>,
+    factor: ChebyshevFactor<S>,
     /// Polynomials and their derivatives at the samples that windows are for.
     polynomials: OnLines<[S::f64s; MOST], DERIVATIVES>,
     /// In the orthogonal polynomials of each window: what was taken off the samples, and what the window adds to that.
@@ -200,7 +195,6 @@ impl WindowsAbreast<'_, '_> {
         let Workspace { columns, factor, polynomials, coefficients, left, .. } = work;
         let errors = !self.fits.errors.is_empty();
         let wanted = self.fit.derivatives + 1;
-        let zero = simd.splat_f64s(0.0);
         let time = simd.sub_f64s(simd.load(&abreast.time, 0), simd.load(&abreast.middle, 0));
         let time = simd.mul_f64s(time, simd.load(&abreast.scale, 0));
         let polynomials = &mut polynomials.0[..wanted];
@@ -209,15 +203,11 @@ impl WindowsAbreast<'_, '_> {
         factor.decompose(simd, degrees, &window.left.moments.0, &window.left.products.0, &window.coefficients.0);
         factor.at(simd, degrees, time, polynomials);
         let (own, off) = (&factor.own.0, &factor.turned.0);
-        let (mut residual, mut far, mut rounded) = (window.square, zero, zero);
-        for (k, (&left, &inverse)) in own.iter().zip(&factor.inverse.0).enumerate().take(degrees) {
-            let end = factor.grown.0[k];
-            residual = simd.negate_mul_add_f64s(simd.mul_f64s(left, left), inverse, residual);
-            far = simd.mul_add_f64s(simd.mul_f64s(end, end), inverse, far);
-            rounded = simd.mul_add_f64s(window.tails.0[k], inverse, rounded);
-        }
+        let kept = KeptDigits::new(simd, degrees, factor, window.square, &window.tails.0);
+        let residual = kept.residual;
         let floor = self.floor(simd, abreast, columns, window);
-        let good = is_good(simd, degrees, columns, [far, factor.weakest], [residual, floor, window.peak, rounded]);
+        let length = simd.load(&columns.length, 0);
+        let good = kept.are_enough(simd, degrees, (length, length), (floor, window.peak));
         let is_fixed = matches!(self.fit.order, Order::Fixed(_));
         // What each order leaves asks for the polynomial that was taken off, too.
         for (coefficient, (&off, &own)) in coefficients.0.iter_mut().zip(off.iter().zip(own)).take(degrees) {
@@ -331,7 +321,7 @@ impl WindowsAbreast<'_, '_> {
 impl<S: Lanes> FoundAbreast<S> {
     /// What is chosen, before anything is estimated.
     #[inline(always)]
-    fn of(simd: S, choice: &SharedChoice<S>, good: S::m64s) -> Self {
+    fn of(simd: S, choice: &ChosenOrders<S>, good: S::m64s) -> Self {
         let nothing = [simd.splat_f64s(0.0); DERIVATIVES];
         let sigma = simd.sqrt_f64s(choice.variance);
         Self { values: nothing, errors: nothing, order: choice.order, sigma, exact: choice.exact, good }
@@ -344,11 +334,11 @@ impl<S: Lanes> FoundAbreast<S> {
         simd: S,
         (residuals, choice, shares, columns): (
             &OrderResiduals<S>,
-            &SharedChoice<S>,
+            &ChosenOrders<S>,
             Option<&OrderShares<S>>,
             &TableColumns,
         ),
-        factor: &SharedFactor<S>,
+        factor: &ChebyshevFactor<S>,
         (coefficients, polynomials): (&[S::f64s; MOST], &[[S::f64s; MOST]]),
         before: &[S::f64s],
     ) {
@@ -359,9 +349,10 @@ impl<S: Lanes> FoundAbreast<S> {
             for ((polynomial, inverse), own) in row.iter().zip(&factor.inverse.0).zip(own).take(degrees) {
                 full = simd.mul_add_f64s(simd.mul_f64s(*polynomial, *inverse), *own, full);
             }
-            let parts = [row, coefficients, &factor.inverse.0];
+            let inverse = &factor.inverse.0;
+            let parts = DerivativeParts { polynomials: row, coefficients, inverse, full, off_centre: None };
             (self.values[derivative], self.errors[derivative]) =
-                residuals.estimate(simd, columns, (choice, shares), parts, full);
+                residuals.estimate(simd, columns, (choice, shares), &parts);
         }
     }
 
@@ -380,28 +371,4 @@ impl<S: Lanes> FoundAbreast<S> {
             *value = simd.add_f64s(before, more);
         }
     }
-}
-
-/// Whether rounding changes a window's residual by no more than it may.
-///
-/// Rounding changes the normal matrix by `ε` times the number of samples, and the right-hand side by the same part of its largest sum of squares.
-/// That changes a residual by as much as solutions are amplified: as one that is made to grow, or where a diagonal is large beside
-/// its pivot. The polynomial that was taken off adds the rounding of its own sums, divided by each pivot.
-#[inline(always)]
-fn is_good<S: Lanes>(
-    simd: S,
-    degrees: usize,
-    columns: &TableColumns,
-    amplified: [S::f64s; 2],
-    sizes: [S::f64s; 4],
-) -> S::m64s {
-    let [far, weakest] = amplified;
-    let [residual, floor, peak, tails] = sizes;
-    let rounding = simd.mul_f64s(simd.load(&columns.length, 0), simd.splat_f64s(f64::EPSILON));
-    let worst = simd.max_f64s(simd.mul_f64s(far, simd.splat_f64s(degrees as f64)), weakest);
-    let lost = simd.mul_f64s(simd.mul_f64s(worst, rounding), peak);
-    let known = simd.max_f64s(residual, floor);
-    let is_kept = simd.less_than_or_equal_f64s(lost, simd.mul_f64s(known, simd.splat_f64s(LOST)));
-    let rounded = simd.mul_f64s(simd.mul_f64s(tails, rounding), simd.splat_f64s(16.0 * f64::EPSILON));
-    simd.and_m64s(is_kept, simd.less_than_or_equal_f64s(rounded, simd.mul_f64s(known, simd.splat_f64s(ROUNDED))))
 }

@@ -152,8 +152,8 @@ impl FitMemory {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::irregular::shared_windows::LOST;
     use crate::local_polynomials::criterion::Criterion;
+    use crate::local_polynomials::kept_digits::LOST;
 
     /// Numbers between zero and one.
     fn random(seed: &mut u64) -> f64 {

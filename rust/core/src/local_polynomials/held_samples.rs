@@ -3,7 +3,11 @@
 use std::ops::Range;
 
 use crate::local_polynomials::incomplete_record::Incomplete;
+use crate::local_polynomials::moment_sums::{LaidSamples, SampleColumns};
 use crate::local_polynomials::weighted_samples::WeightedSamples;
+use crate::simd::aligned::Aligned;
+use crate::simd::instructions::Instructions;
+use crate::simd::vectors::{MOST_LANES, dispatch};
 use crate::status::Status;
 
 /// A window that is to be fitted.
@@ -13,7 +17,7 @@ pub(crate) struct HeldWindow {
     pub(crate) number: usize,
     /// Of the window's samples those in its part of the record, and the one that it is for.
     inside: Range<usize>,
-    at: usize,
+    pub(crate) at: usize,
     /// Where the first of them lies among those that are laid out.
     laid: usize,
     /// Samples that are there.
@@ -35,6 +39,13 @@ pub(crate) struct HeldSamples {
     /// Samples of the record that were laid out last, and where the first of them lies.
     last: Range<usize>,
     laid: usize,
+}
+
+impl HeldWindow {
+    /// Whether all of the window's samples are in its part of the record, missing ones too.
+    pub(crate) fn is_whole(&self, length: usize) -> bool {
+        self.inside.len() == length
+    }
 }
 
 impl HeldSamples {
@@ -104,6 +115,36 @@ impl HeldSamples {
             reference: self.values[middle],
             flags,
         })
+    }
+
+    /// The samples of whole windows side by side: as they lie where each follows the one before, else laid into columns.
+    pub(crate) fn side_by_side<'a>(
+        &'a self,
+        windows: &[HeldWindow],
+        (instructions, weighted): (Instructions, bool),
+        columns: &'a mut [Aligned; 2],
+    ) -> SampleColumns<'a> {
+        let (lanes, samples) = (instructions.lanes(), windows[0].inside.len());
+        let last = windows.len() - 1;
+        let mut references = [0.0; MOST_LANES];
+        for (lane, reference) in references.iter_mut().enumerate() {
+            *reference = windows[lane.min(last)].reference;
+        }
+        let is_next = |pair: &[HeldWindow]| pair[0].laid + 1 == pair[1].laid;
+        if windows.len() == lanes && windows.windows(2).all(is_next) {
+            let (weights, values, first) = (&self.weights[..], &self.values[..], windows[0].laid);
+            return SampleColumns { weights, values, first, stride: 1, samples, references, weighted };
+        }
+        let mut lists = [[&[][..]; MOST_LANES]; 2];
+        for lane in 0..lanes {
+            let laid = windows[lane.min(last)].laid;
+            for (lists, list) in lists.iter_mut().zip([&self.weights, &self.values]) {
+                lists[lane] = &list[laid..laid + samples];
+            }
+        }
+        dispatch(instructions, LaidSamples { lists, into: columns });
+        let [weights, values] = &*columns;
+        SampleColumns { weights, values, first: 0, stride: lanes, samples, references, weighted }
     }
 
     /// A window with the times of a whole one's samples.

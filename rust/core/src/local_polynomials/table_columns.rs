@@ -1,6 +1,6 @@
 //! Columns of what the choice of the order knows of windows side by side.
 
-use crate::irregular::shared_sums::MOST;
+use crate::local_polynomials::chebyshev_sums::MOST;
 use crate::local_polynomials::order_table::OrderTable;
 use crate::simd::aligned::Aligned;
 use crate::simd::vectors::MOST_LANES;

@@ -12,12 +12,12 @@
 
 use pulp::NullaryFnOnce;
 
-use crate::irregular::shared_sums::{DERIVATIVES, MOST};
+use crate::local_polynomials::chebyshev_sums::{DERIVATIVES, MOST};
 use crate::simd::aligned::OnLines;
 use crate::simd::vectors::Lanes;
 
 /// Orthogonal polynomials and what they find in the samples.
-pub(crate) struct SharedFactor<S: Lanes> {
+pub(crate) struct ChebyshevFactor<S: Lanes> {
     /// `L⁻¹ b` of the samples: their products with each polynomial.
     pub(crate) own: OnLines<S::f64s, MOST>,
     /// `L⁻¹ b` of a row that is made to grow: for the condition.
@@ -33,7 +33,7 @@ pub(crate) struct SharedFactor<S: Lanes> {
     products: OnLines<[S::f64s; 2 * MOST], 2>,
 }
 
-impl<S: Lanes> SharedFactor<S> {
+impl<S: Lanes> ChebyshevFactor<S> {
     #[inline(always)]
     pub(crate) fn zero(simd: S) -> Self {
         let zero = simd.splat_f64s(0.0);
@@ -300,7 +300,7 @@ impl<S: Lanes> PassedPair<S> {
 /// All rows, two by two: compiled apart from what uses them.
 struct EliminatedRows<'a, S: Lanes> {
     simd: S,
-    factor: &'a mut SharedFactor<S>,
+    factor: &'a mut ChebyshevFactor<S>,
     degrees: usize,
     given: Given<'a, S>,
 }
@@ -321,7 +321,7 @@ impl<S: Lanes> NullaryFnOnce for EliminatedRows<'_, S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::irregular::shared_sums::{ChebyshevSums, at};
+    use crate::local_polynomials::chebyshev_sums::{ChebyshevSums, at};
     use crate::simd::instructions::Instructions;
     use crate::simd::vectors::{Kernel, dispatch};
 
@@ -360,7 +360,7 @@ mod tests {
             for (k, coefficient) in off.iter_mut().enumerate().take(degrees) {
                 *coefficient = simd.splat_f64s(1.0 / (k + 1) as f64);
             }
-            let mut factor = SharedFactor::zero(simd);
+            let mut factor = ChebyshevFactor::zero(simd);
             factor.decompose(simd, degrees, &sums.moments.0, &sums.products.0, &off);
             let best = factor.solve(simd, degrees);
             // Sums of squares and products with the samples, with what is taken off, and with all lower ones.

@@ -1,7 +1,7 @@
-//! The order of windows side by side, their derivatives and standard errors: as [`crate::irregular::window_fit`] has them for a window alone.
+//! The order of windows side by side, their derivatives and standard errors: as [`crate::local_polynomials::own_orders`] has them for a window alone.
 
-use crate::irregular::shared_sums::{DERIVATIVES, MOST};
-use crate::irregular::table_columns::TableColumns;
+use crate::local_polynomials::chebyshev_sums::{DERIVATIVES, MOST};
+use crate::local_polynomials::table_columns::TableColumns;
 use crate::simd::aligned::OnLines;
 use crate::simd::vectors::Lanes;
 
@@ -14,10 +14,22 @@ pub(crate) struct OrderResiduals<S: Lanes> {
 }
 
 /// The order of each window.
-pub(crate) struct SharedChoice<S: Lanes> {
+pub(crate) struct ChosenOrders<S: Lanes> {
     pub(crate) order: S::f64s,
     pub(crate) variance: S::f64s,
     pub(crate) exact: S::m64s,
+}
+
+/// What a derivative follows from.
+pub(crate) struct DerivativeParts<'a, S: Lanes> {
+    /// Of the orthogonal polynomials, what the samples have in these, and one over their sums of squares.
+    pub(crate) polynomials: &'a [S::f64s; MOST],
+    pub(crate) coefficients: &'a [S::f64s; MOST],
+    pub(crate) inverse: &'a [S::f64s; MOST],
+    /// That of the fit of the highest order.
+    pub(crate) full: S::f64s,
+    /// Its number, and which windows have samples off their centre: these take the order that is the best for it.
+    pub(crate) off_centre: Option<(usize, S::m64s)>,
 }
 
 /// What every order's share in the error of each window is.
@@ -28,7 +40,7 @@ pub(crate) struct OrderShares<S: Lanes> {
     counts: [bool; MOST],
 }
 
-impl<S: Lanes> SharedChoice<S> {
+impl<S: Lanes> ChosenOrders<S> {
     /// What of orthogonal polynomials is to be added to the one that was taken off: all of `own` up to the order, and above it minus what that has,
     /// over each polynomial's sum of squares.
     #[inline(always)]
@@ -71,10 +83,10 @@ impl<S: Lanes> OrderResiduals<S> {
 
     /// An order that is given.
     #[inline(always)]
-    pub(crate) fn fixed(&self, simd: S, columns: &TableColumns) -> SharedChoice<S> {
+    pub(crate) fn fixed(&self, simd: S, columns: &TableColumns) -> ChosenOrders<S> {
         let order = self.degrees - 1;
         let residual = self.residuals.0[order];
-        SharedChoice {
+        ChosenOrders {
             order: simd.splat_f64s(order as f64),
             variance: simd.mul_f64s(residual, simd.load(&columns.freedom, order * S::F64_LANES)),
             exact: simd.less_than_or_equal_f64s(residual, self.floor),
@@ -83,7 +95,7 @@ impl<S: Lanes> OrderResiduals<S> {
 
     /// The order of the least weighted residual, the lowest of equals.
     #[inline(always)]
-    pub(crate) fn choose(&self, simd: S, columns: &TableColumns) -> SharedChoice<S> {
+    pub(crate) fn choose(&self, simd: S, columns: &TableColumns) -> ChosenOrders<S> {
         let (zero, lanes) = (simd.splat_f64s(0.0), S::F64_LANES);
         let (mut least, mut order) = (simd.splat_f64s(f64::INFINITY), zero);
         let (mut variance, mut residual) = (zero, zero);
@@ -96,7 +108,7 @@ impl<S: Lanes> OrderResiduals<S> {
             variance = simd.select_f64s(better, simd.load(&columns.freedom, one * lanes), variance);
         }
         let exact = simd.less_than_or_equal_f64s(residual, self.floor);
-        SharedChoice { order, variance: simd.mul_f64s(variance, residual), exact }
+        ChosenOrders { order, variance: simd.mul_f64s(variance, residual), exact }
     }
 
     /// The share of every order in what is known of each window.
@@ -129,18 +141,17 @@ impl<S: Lanes> OrderResiduals<S> {
         OrderShares { shares, counts }
     }
 
-    /// A derivative and its standard error: `full` is that of the highest order, `polynomials` the row of the derivative below the factor.
+    /// A derivative and its standard error.
     #[inline(always)]
     pub(crate) fn estimate(
         &self,
         simd: S,
         columns: &TableColumns,
-        (choice, shares): (&SharedChoice<S>, Option<&OrderShares<S>>),
-        parts: [&[S::f64s; MOST]; 3],
-        full: S::f64s,
+        (choice, shares): (&ChosenOrders<S>, Option<&OrderShares<S>>),
+        derivative: &DerivativeParts<'_, S>,
     ) -> (S::f64s, S::f64s) {
         let zero = simd.splat_f64s(0.0);
-        let [polynomials, coefficients, inverse] = parts;
+        let DerivativeParts { polynomials, coefficients, inverse, full, off_centre } = *derivative;
         let (mut values, mut gains) = (OnLines([full; MOST]), OnLines([zero; MOST]));
         let (mut value, mut gain) = (full, zero);
         for order in (0..self.degrees).rev() {
@@ -157,6 +168,9 @@ impl<S: Lanes> OrderResiduals<S> {
             taken = simd.select_f64s(is_taken, values.0[order], taken);
             of_taken = simd.select_f64s(is_taken, gain, of_taken);
         }
+        if let Some(lowest) = off_centre {
+            (taken, of_taken) = self.best(simd, choice, lowest, [&values.0, &gains.0], [taken, of_taken]);
+        }
         let Some(OrderShares { shares, counts }) = shares else {
             return (taken, simd.sqrt_f64s(simd.mul_f64s(choice.variance, of_taken)));
         };
@@ -172,6 +186,36 @@ impl<S: Lanes> OrderResiduals<S> {
             error = simd.add_f64s(error, simd.select_f64s(has_share, part, zero));
         }
         (taken, error)
+    }
+}
+
+impl<S: Lanes> OrderResiduals<S> {
+    /// The value and the gain of the order with the least estimated squared bias plus variance (see `off_centre`), from that of the derivative to the
+    /// one that was chosen; where windows are full those of that one.
+    #[inline(always)]
+    fn best(
+        &self,
+        simd: S,
+        choice: &ChosenOrders<S>,
+        (derivative, is_off_centre): (usize, S::m64s),
+        [values, gains]: [&[S::f64s; MOST]; 2],
+        [value, gain]: [S::f64s; 2],
+    ) -> (S::f64s, S::f64s) {
+        let (mut taken, mut of_taken) = (value, gain);
+        let mut least = simd.mul_f64s(choice.variance, gain);
+        for order in (derivative..self.degrees).rev() {
+            let is_lower = simd.less_than_f64s(simd.splat_f64s(order as f64), choice.order);
+            let chance = simd.mul_f64s(choice.variance, simd.sub_f64s(gain, gains[order]));
+            let off = simd.sub_f64s(values[order], value);
+            let bias = simd.max_f64s(simd.sub_f64s(simd.mul_f64s(off, off), chance), simd.splat_f64s(0.0));
+            let error = simd.mul_add_f64s(choice.variance, gains[order], bias);
+            let is_better = simd.and_m64s(is_lower, simd.less_than_or_equal_f64s(error, least));
+            let is_taken = simd.and_m64s(is_better, is_off_centre);
+            taken = simd.select_f64s(is_taken, values[order], taken);
+            of_taken = simd.select_f64s(is_taken, gains[order], of_taken);
+            least = simd.select_f64s(is_taken, error, least);
+        }
+        (taken, of_taken)
     }
 }
 
