@@ -1,5 +1,36 @@
 """Reads files of other programs with the libraries that know them, in a process of its own."""
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from tvident._formats.known import FOLDERS, FORMATS, PROCESS, Format
 
-__all__ = ["FOLDERS", "FORMATS", "PROCESS", "Format"]
+if TYPE_CHECKING:
+    from tvident._formats.netcdf import (
+        NetcdfMeaning,
+        is_netcdf_3,
+        netcdf_columns,
+        netcdf_meaning,
+        numbers_of_netcdf_3,
+        numbers_of_netcdf_4,
+    )
+
+__all__ = [
+    "FOLDERS",
+    "FORMATS",
+    "PROCESS",
+    "Format",
+    "NetcdfMeaning",
+    "is_netcdf_3",
+    "netcdf_columns",
+    "netcdf_meaning",
+    "numbers_of_netcdf_3",
+    "numbers_of_netcdf_4",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Enter a reader when it is first asked for: most recordings are of other formats."""
+    if name not in __all__:
+        raise AttributeError(f"module 'tvident._formats' has no attribute {name!r}")
+    return getattr(import_module("tvident._formats.netcdf"), name)

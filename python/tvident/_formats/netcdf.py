@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any
 
 from tvident._formats.columns import UNITS, channels_of, first_of, rate_in
@@ -18,51 +20,120 @@ _NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable"
 _FILLED = ("_FillValue", "missing_value")
 
 
-def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
-    """Give every variable of numbers in its unit, as its attributes scale it, NaN where they say that it is missing."""
+@dataclass(frozen=True)
+class NetcdfMeaning:
+    """How the numbers of a variable are meant, as its attributes say.
+
+    Parameters
+    ----------
+    marks : tuple of numbers
+        What stands where a value is missing.
+    factor, offset : float
+        What numbers are multiplied by, and what is added then.
+    units : mapping
+        The unit as an attribute, where there is one: that of times without since when they count.
+    """
+
+    marks: tuple[Any, ...]
+    factor: float
+    offset: float
+    units: Mapping[str, str]
+
+    def of(self, values: Any) -> Any:
+        """Return numbers as they are meant, NaN where they are missing."""
+        import numpy as np  # noqa: PLC0415 - within the limits
+
+        values = np.asarray(values)
+        values = values.astype(values.dtype.newbyteorder("="))
+        missing = np.isin(values, np.array(self.marks, values.dtype)) if self.marks else np.zeros(values.shape, bool)
+        if (self.factor, self.offset) != (1.0, 0.0):
+            values = values.astype(np.float64) * self.factor + self.offset
+        return np.where(missing, np.nan, values) if missing.any() else values
+
+
+def netcdf_meaning(attributes: Mapping[str, Any]) -> NetcdfMeaning:
+    """Return how the numbers of a variable with these attributes are meant."""
+    import numpy as np  # noqa: PLC0415 - within the limits
+
+    marks = tuple(np.asarray(attributes[key]).reshape(-1)[0] for key in _FILLED if key in attributes)
+    factor, offset = (
+        default if said is None else float(said)
+        for said, default in (
+            (first_of(attributes, ["scale_factor"]), 1.0),
+            (first_of(attributes, ["add_offset"]), 0.0),
+        )
+    )
+    said = first_of(attributes, UNITS)
+    since = _SINCE.fullmatch(said) if isinstance(said, str) else None
+    return NetcdfMeaning(marks, factor, offset, {"units": since[1] if since else said} if isinstance(said, str) else {})
+
+
+def is_netcdf_3(path: str) -> bool:
+    """Return whether a file is of version 3, and not of version 4, which is HDF5.
+
+    Raises
+    ------
+    ValueError
+        If it is of a version that is not read, or SciPy, which reads version 3, is not there.
+    """
     with open(path, "rb") as file:  # noqa: PTH123 - before anything else is imported
         begin = file.read(4)
     if begin == b"CDF\x05":
         raise ValueError("it is CDF-5, which is not read: convert it with nccopy -k nc4 in.nc out.nc")
-    yield from _of_version_3(path, skipped) if begin.startswith(b"CDF") else _of_version_4(path, skipped)
+    if begin.startswith(b"CDF") and find_spec("scipy") is None:
+        raise ValueError("it is netCDF 3, which needs SciPy: pip install 'tvident[io]'")
+    return begin.startswith(b"CDF")
+
+
+def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
+    """Give every variable of numbers in its unit, as its attributes scale it, NaN where they say that it is missing."""
+    yield from _of_version_3(path, skipped) if is_netcdf_3(path) else _of_version_4(path, skipped)
 
 
 def _of_version_3(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
-    try:
-        from scipy.io import netcdf_file  # noqa: PLC0415 - an extra
-    except ImportError:
-        raise ValueError("it is netCDF 3, which needs SciPy: pip install 'tvident[io]'") from None
+    from scipy.io import netcdf_file  # noqa: PLC0415 - an extra
+
     with netcdf_file(path, "r", mmap=False) as file:
         yield from _rate(file._attributes, [one._attributes for one in file.variables.values()], skipped)  # noqa: SLF001 - as SciPy keeps them
-        labels = {name: one[:] for name, one in file.variables.items() if one.data.dtype.kind in "SU"}
-        for name, variable in file.variables.items():
-            if name in labels:
-                is_used = any(name in one.dimensions for other, one in file.variables.items() if other != name)
-                skipped += [] if is_used else [f"{cut(name)} (no numbers)"]
-                continue
-            beside = [labels[one] for one in variable.dimensions if one in labels]
-            yield from _scaled(name, variable[:].copy(), variable._attributes, beside)  # noqa: SLF001 - likewise
+        for name, variable, labels in numbers_of_netcdf_3(file, skipped):
+            yield from _scaled(name, variable[:].copy(), variable._attributes, labels)  # noqa: SLF001 - likewise
 
 
 def _of_version_4(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     import h5py  # noqa: PLC0415 - an extra
 
     with h5py.File(path, "r") as file:
-        found = dict(datasets(file, "", h5py))
-        yield from _rate(file.attrs, [one.attrs for one in found.values()], skipped)
-        for name, dataset in found.items():
-            bare = name.replace("/", ".")
-            if _is_no_variable(dataset) or (dataset.is_scale and dataset.dtype.kind in "OSU"):
-                continue  # what is a dimension of words calls the columns of others
-            if dataset.shape is None or dataset.dtype.kind not in "biufc":
-                skipped.append(f"{cut(bare)} (no numbers)")
-                continue
-            values = read_whole(bare, dataset, skipped)
-            if values is None:
-                continue
-            scales = [one[0] for one in dataset.dims if len(one)]
-            beside = [one[()] for one in scales if one.dtype.kind in "OSU"]
-            yield from _scaled(bare, values, dataset.attrs, beside)
+        yield from _rate(file.attrs, [one.attrs for _, one in datasets(file, "", h5py)], skipped)
+        for name, dataset, labels in numbers_of_netcdf_4(file, skipped):
+            values = read_whole(name, dataset, skipped)
+            if values is not None:
+                yield from _scaled(name, values, dataset.attrs, labels)
+
+
+def numbers_of_netcdf_3(file: Any, skipped: list[str]) -> Iterator[tuple[str, Any, list[Any]]]:
+    """Give every variable of numbers in a file as SciPy opens it: its name, itself, and what names its columns."""
+    labels = {name: one[:].copy() for name, one in file.variables.items() if one.data.dtype.kind in "SU"}
+    for name, variable in file.variables.items():
+        if name in labels:
+            is_used = any(name in one.dimensions for other, one in file.variables.items() if other != name)
+            skipped += [] if is_used else [f"{cut(name)} (no numbers)"]
+            continue
+        yield name, variable, [labels[one] for one in variable.dimensions if one in labels]
+
+
+def numbers_of_netcdf_4(file: Any, skipped: list[str]) -> Iterator[tuple[str, Any, list[Any]]]:
+    """Give every variable of numbers in a file as h5py opens it: its name with dots, itself, and what names its columns."""
+    import h5py  # noqa: PLC0415 - an extra
+
+    for name, dataset in datasets(file, "", h5py):
+        bare = name.replace("/", ".")
+        if _is_no_variable(dataset) or (dataset.is_scale and dataset.dtype.kind in "OSU"):
+            continue  # what is a dimension of words calls the columns of others
+        if dataset.shape is None or dataset.dtype.kind not in "biufc":
+            skipped.append(f"{cut(bare)} (no numbers)")
+            continue
+        scales = [one[0] for one in dataset.dims if len(one)]
+        yield bare, dataset, [one[()] for one in scales if one.dtype.kind in "OSU"]
 
 
 def _is_no_variable(dataset: Any) -> bool:
@@ -83,28 +154,24 @@ def _rate(
 
 def _scaled(name: str, values: Any, attributes: Mapping[str, Any], labels: Sequence[Any]) -> Iterator[tuple[str, Any]]:
     """Give a variable as it is meant; a dimension of words names its columns."""
+    meaning = netcdf_meaning(attributes)
+    yield from channels_of(name, meaning.of(values), _said(meaning, labels))
+
+
+def netcdf_columns(name: str, shape: Sequence[int], meaning: NetcdfMeaning, labels: Sequence[Any]) -> list[str]:
+    """Return the names, with units, that the channels of a variable of this shape have."""
     import numpy as np  # noqa: PLC0415 - within the limits
 
-    values = np.asarray(values)
-    values = values.astype(values.dtype.newbyteorder("="))
-    marks = [np.asarray(attributes[key]).reshape(-1)[0] for key in _FILLED if key in attributes]
-    missing = np.isin(values, np.array(marks, values.dtype)) if marks else np.zeros(values.shape, bool)
-    factor, offset = (
-        default if said is None else float(said)
-        for said, default in (
-            (first_of(attributes, ["scale_factor"]), 1.0),
-            (first_of(attributes, ["add_offset"]), 0.0),
-        )
-    )
-    if (factor, offset) != (1.0, 0.0):
-        values = values.astype(np.float64) * factor + offset
-    if missing.any():
-        values = np.where(missing, np.nan, values)
-    said = first_of(attributes, UNITS)
-    since = _SINCE.fullmatch(said) if isinstance(said, str) else None
-    own = {"units": since[1] if since else said} if isinstance(said, str) else {}
-    columns = [{"columns": _words(one)} for one in labels]
-    yield from channels_of(name, values, [own, *columns])
+    nothing = np.broadcast_to(np.zeros(()), tuple(shape))
+    found = list(channels_of(name, nothing, _said(meaning, labels)))
+    lengths = [length for length in shape if length > 1]
+    if len(found) == 1 and len(lengths) == 2:  # noqa: PLR2004 - rows and columns, which nothing names
+        return [f"{name}.{place}" for place in range(min(lengths))]
+    return [called for called, _ in found]
+
+
+def _said(meaning: NetcdfMeaning, labels: Sequence[Any]) -> list[Mapping[str, Any]]:
+    return [meaning.units, *({"columns": _words(one)} for one in labels)]
 
 
 def _words(labels: Any) -> list[str]:

@@ -27,12 +27,13 @@ from tvident._files import (
 )
 from tvident._identify import Method
 from tvident._in_pieces.copied import copied
+from tvident._in_pieces.file_rows import SourceChannel
 from tvident._in_pieces.found import FileIdentification
 from tvident._in_pieces.kept import Kept, mark_of
 from tvident._in_pieces.outputs import check_output
 from tvident._in_pieces.recorded import RecordingOfFile, uniform, units_of
 from tvident._in_pieces.run import AskedOfFile, Run
-from tvident._in_pieces.sources import Source, SourceChannel, opened
+from tvident._in_pieces.sources import Source, opened
 from tvident._pieces import Given
 from tvident._units import Channel as Said
 from tvident._units import named_unit, times_in_seconds
@@ -83,8 +84,8 @@ def identify_file(
     Parameters
     ----------
     path : str or Path
-        The recording: ``.npy`` (columns, or fields with names), ``.parquet``, ``.h5``, ``.zarr``, or text (``.csv``), which is copied once
-        to binary numbers beside the output.
+        The recording: ``.npy`` (columns, or fields with names), ``.parquet``, ``.h5``, ``.nc`` (netCDF 3 and 4), ``.zarr``, or text
+        (``.csv``), which is copied once to binary numbers beside the output.
     output : str or Path
         Where columns go, one row for every `step`-th sample: ``.npy`` (fields with names), ``.parquet``, ``.h5``, ``.zarr`` or ``.csv``.
         All but ``.npy`` and ``.csv`` hold settings and constants as JSON too, under ``tvident``.

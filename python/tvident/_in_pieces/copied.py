@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from tvident._files import FileError, FileWarning, copy_text, printable
+from tvident._in_pieces.file_rows import ColumnOfRows, RowsOfFile
 from tvident._in_pieces.recorded import check_same
-from tvident._in_pieces.sources import ColumnOfRows, RowsOfFile, Source
+from tvident._in_pieces.sources import Source
 
 
 def copied(path: Path, folder: Path, mark: str) -> Source:

@@ -13,8 +13,8 @@ import numpy.typing as npt
 from tvident import _arguments as arguments
 from tvident._files import FileError, printable
 from tvident._identify import Held, Span
+from tvident._in_pieces.file_rows import SourceChannel
 from tvident._in_pieces.kept import mark_of
-from tvident._in_pieces.sources import SourceChannel
 from tvident._units import Axis, axis_of
 from tvident._units import Channel as Said
 

@@ -5,24 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tvident._files import TEXT_ENDINGS, FileError, ending_of, full_name, listed, printable, without_marks
+from tvident._in_pieces.file_rows import ColumnOfRows, RowsOfFile, SourceChannel, opened_by_h5py
 from tvident._units import named_unit, with_unit
 
 _UNITS = ("unit", "units", "Unit", "Units", "UNITS")
 _COLUMNS = ("columns", "column_names", "channels", "channel_names", "names", "labels")
 """Attributes that list the columns of a matrix."""
-
-
-class SourceChannel(Protocol):
-    """Samples of one channel, wherever they are."""
-
-    def read(self, first: int, end: int) -> npt.NDArray[Any]:
-        """Return some samples, shape (end - first,)."""
 
 
 @dataclass(frozen=True)
@@ -88,39 +82,6 @@ class _OfArray:
         return np.asarray(self.array[self.place, first:end] if self.is_row else self.array[first:end, self.place])
 
 
-class RowsOfFile:
-    """Rows that lie one after the other in a file: the last that were read are kept, for another column of theirs."""
-
-    def __init__(self, path: Path, offset: int, row: np.dtype[Any], columns: int = 1) -> None:
-        self._path, self._offset, self._row, self._columns = path, offset, row, columns
-        self._last: tuple[int, int, npt.NDArray[Any]] | None = None
-
-    def read(self, first: int, end: int) -> npt.NDArray[Any]:
-        """Return some rows, shape (end - first, columns)."""
-        if self._last is not None and self._last[:2] == (first, end):
-            return self._last[2]
-        # Not mapped: pages of a map count as memory until the system wants them back.
-        count, start = (end - first) * self._columns, self._offset + first * self._columns * self._row.itemsize
-        rows = np.fromfile(self._path, self._row, count, offset=start)
-        if rows.size < count:
-            raise FileError(f"{printable(self._path)}: must be whole; it ends before sample {end}; copy it again")
-        self._last = first, end, rows.reshape(-1, self._columns)
-        return self._last[2]
-
-
-@dataclass(frozen=True)
-class ColumnOfRows:
-    """A column of rows, by its number, or the name of a field."""
-
-    rows: RowsOfFile
-    place: int | str
-
-    def read(self, first: int, end: int) -> npt.NDArray[Any]:
-        """Return some samples, as they lie between others."""
-        found = self.rows.read(first, end)
-        return found[self.place][:, 0] if isinstance(self.place, str) else found[:, self.place]
-
-
 def _npy(path: Path) -> Source:
     with path.open("rb") as file:
         version = np.lib.format.read_magic(file)
@@ -169,26 +130,21 @@ def _parquet(path: Path) -> Source:
 
 
 def _hdf5(path: Path) -> Source:
-    try:
-        import h5py  # noqa: PLC0415 - an extra
-    except ImportError:
-        raise ImportError(
-            "HDF5 needs h5py, which is not installed; install it with: pip install 'tvident[io]'"
-        ) from None
-    try:
-        file = h5py.File(path, "r")
-    except OSError as error:
-        raise FileError(
-            f"{printable(path)}: must be whole; h5py says: {printable(error, 200)}; copy it again"
-        ) from None
+    file = opened_by_h5py(path, "HDF5")
     found: dict[str, Any] = {}
 
     def note(name: str, one: Any) -> None:
-        if isinstance(one, h5py.Dataset):
+        if hasattr(one, "shape"):  # groups have none
             found[name.replace("/", ".")] = one
 
     file.visititems(note)
     return _source(path, _of_arrays(found), file.close)
+
+
+def _netcdf(path: Path) -> Source:
+    from tvident._in_pieces.netcdf import channels_in  # noqa: PLC0415 - few need it
+
+    return _source(path, *channels_in(path))
 
 
 def _zarr(path: Path) -> Source:
@@ -260,6 +216,9 @@ READERS: dict[str, Callable[[Path], Source]] = {
     ".parquet": _parquet,
     ".h5": _hdf5,
     ".hdf5": _hdf5,
+    ".nc": _netcdf,
+    ".nc4": _netcdf,
+    ".cdf": _netcdf,
     ".zarr": _zarr,
 }
 """By the ending."""
