@@ -13,7 +13,14 @@ from tvident._arguments.arrays import (
 from tvident._arguments.channels import as_record, channel, channels
 from tvident._arguments.containers import fields_of, is_table, package_of, plain, time_axis
 from tvident._arguments.digits import explained_in_words, ordinal, own_digits, percent, to_digits_of, with_error
-from tvident._arguments.labelled import check_against_labels, cure_by_labels, implied_times, is_called_time, is_time
+from tvident._arguments.labelled import (
+    check_against_labels,
+    cure_by_labels,
+    implied_times,
+    is_called_time,
+    is_of_one_clock,
+    is_time,
+)
 from tvident._arguments.labels import Labels, labels_in, labels_of, labels_out
 from tvident._arguments.lost import check_no_lost_samples
 from tvident._arguments.marks import CLOSE_TO_MARK, marks_in
@@ -97,6 +104,7 @@ __all__ = [
     "in_unit_of_time",
     "irregular_at_sight",
     "is_called_time",
+    "is_of_one_clock",
     "is_read_as_it_is",
     "is_several",
     "is_table",

@@ -16,13 +16,20 @@ from tvident._units import ROTARY, factor_to, is_convertible, named_unit, times_
 _OTHER_RATE = 0.1
 """Times of few digits and gaps move steps by less than this part; a wrong rate is off by more."""
 
+_CLOSER = (
+    r"(unix|epoch|utc|gps|abs(olute)?|rel(ative)?|elapsed|running|recording|system|mess|sim(ulation)?|wall|up|robot|controller|ros|log"
+    r"|publish|receive|bag)[ _.-]{0,2}(time|zeit|(time)?stamp)|time[ _.-]?(unix|epoch|utc|abs(olute)?|rel(ative)?)"
+)
+"""What times are called that say whose clock they are of."""
+
 _CALLED = re.compile(
-    r"_{0,2}(t|time|times|zeit|temps|tiempo|tempo|x_value|timestamps?|elapsed( time)?|time_?stamp"
-    r"|(unix|epoch|utc|gps|abs(olute)?|rel(ative)?|elapsed|running|recording|system|mess)[ _.-]{0,2}(time|zeit|timestamp)"
-    r"|time[ _.-]?(unix|epoch|utc|abs(olute)?|rel(ative)?))([ _.-]?\d+)?",
+    r"_{0,2}(t|tout|time|times|zeit|temps|tiempo|tempo|x_value|timestamps?|stamp|elapsed( time)?|time_?stamp"
+    rf"|{_CLOSER})([ _.-]?\d+)?",
     re.IGNORECASE,
 )
-"""What times are called."""
+"""What times are called: ``tout`` by Simulink, ``stamp`` by robots."""
+
+_OF_ONE_CLOCK = re.compile(rf"_{{0,2}}({_CLOSER})([ _.-]?\d+)?", re.IGNORECASE)
 
 _UNITS = (1.0, 1e-3, 1e-6, 1e-9, 60.0, 3600.0, 86400.0)
 """Seconds of what times without a unit may be in."""
@@ -158,6 +165,11 @@ def _called_times(values: Any) -> tuple[npt.NDArray[np.float64], tuple[float, ..
 def is_called_time(name: str) -> bool:
     """Return whether a name, without its unit, is what times are called."""
     return _CALLED.fullmatch(name) is not None
+
+
+def is_of_one_clock(name: str) -> bool:
+    """Return whether a name, without its unit, says of which clock its times are: another may have begun long before."""
+    return _OF_ONE_CLOCK.fullmatch(name) is not None
 
 
 def is_time(name: str, unit: str) -> bool:

@@ -51,7 +51,7 @@ CHANNELS = options_of(
     click.option(
         "--joint",
         metavar="NAME",
-        help="Of a ROS bag, instead: its position, its effort, its velocity and their stamps.",
+        help="Of a robot's log, instead: its position, its effort, its velocity and their stamps.",
     ),
     click.option("--angle-scale", metavar="SCALE", help="Number or variable to multiply the angle by."),
     click.option("--torque-scale", metavar="SCALE", help="Number or variable to multiply the torque by."),

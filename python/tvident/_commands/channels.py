@@ -19,6 +19,7 @@ from tvident import recordings
 from tvident._files import (
     FileRecording,
     StatedRate,
+    counters,
     ending_by,
     full_name,
     increasing_times,
@@ -32,6 +33,9 @@ from tvident._units import Channel, UnitError, factor_between, named_unit
 
 _FEW = 64
 """Numbers of trials that may all say one thing."""
+
+_FEW_CLOCKS = 3
+"""Channels of times that are named at most."""
 
 _RATES = {"fs", "fsamp", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency"}
 """What a sample rate is called beside channels, without blanks and lines."""
@@ -81,8 +85,20 @@ def check_has_times(who: str, given: bool, channels: recordings.Channels, file: 
     if given:
         return
     found = time_channels(channels) or [named_unit(name)[0] for name in increasing_times(channels)]
-    known = f"; it may be --time {shlex.quote(printable(found[0]))}" if found else _rate_in(channels) or stated_in(file)
+    shown = [f"--time {shlex.quote(printable(name))}" for name in dict.fromkeys(found)][:_FEW_CLOCKS]
+    known = (
+        f"; it may be {' or '.join(shown)}" if found else _rate_in(channels) or stated_in(file) or _counted_in(channels)
+    )
     raise click.UsageError(f"{who} the sample period; got none; give --sample-rate, --delta or --time{known}")
+
+
+def _counted_in(channels: recordings.Channels) -> str:
+    """Return what to type where a channel counts ticks or samples; nothing elsewhere."""
+    for name, step in counters(channels):
+        bare = printable(named_unit(name)[0])
+        each = f"'{bare}' goes up by {step} from sample to sample"
+        return f"; {each}: if it counts milliseconds, give --time {shlex.quote(bare)} --time-unit ms"
+    return ""
 
 
 def _rate_in(channels: recordings.Channels) -> str:

@@ -25,7 +25,7 @@ from tvident._commands.channels import (
 )
 from tvident._commands.equation import lag_of, parameter_of, terms_of
 from tvident._commands.given import check_time, given
-from tvident._commands.named import named
+from tvident._commands.named import named, with_joint
 from tvident._commands.output import PICTURE, RECORDING, RESULTS, check_outputs, give, save_figure
 from tvident._commands.own_clocks import check_own_clocks
 from tvident._commands.rates import say_other_rate
@@ -53,13 +53,13 @@ def compare(
 ) -> None:
     """Compare candidates for the equation of motion of the angle and torque in FILE."""
     options = named(options, file)
-    angle, torque, time_channel = (options.pop(name) for name in ("angle", "torque", "time_channel"))
-    del options["joint"]
     check_outputs(
         {RESULTS: output, PICTURE: plot},
-        {RECORDING: file, "the angle": angle, "the torque": torque, "the mask": mask},
+        {RECORDING: file, "the angle": options["angle"], "the torque": options["torque"], "the mask": mask},
     )
     channels = channels_in(file)
+    options = with_joint(options, channels, file)
+    angle, torque, time_channel = (options.pop(name) for name in ("angle", "torque", "time_channel"))
     check_own_clocks(channels, [angle, torque], time_channel, torque_time, file, has_rate=False, takes_both=not methods)
     check_has_times("compare needs", check_time(options["sample_rate"], options["delta"], time_channel), channels, file)
     common: dict[str, Any] = {

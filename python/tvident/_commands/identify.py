@@ -12,7 +12,7 @@ import numpy as np
 from tvident._commands.channels import channels_in
 from tvident._commands.identification import identified, inputs
 from tvident._commands.in_pieces import identify_in_pieces
-from tvident._commands.named import named, with_velocity
+from tvident._commands.named import named, with_joint
 from tvident._commands.output import (
     PICTURE,
     RESULTS,
@@ -53,7 +53,7 @@ def identify(
     if table is not None:
         check_beside(table)
     channels = channels_in(file)
-    result = identified(channels, file, **with_velocity(options, channels, file))
+    result = identified(channels, file, **with_joint(options, channels, file))
     if settings_output is not None:
         with replaced(Path(settings_output)) as written:
             written.write((json.dumps(result.settings, indent=1) + "\n").encode())

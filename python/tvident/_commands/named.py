@@ -10,8 +10,12 @@ import click
 import numpy as np
 
 from tvident import recordings
-from tvident._commands.channels import channels_in, source_of
-from tvident._files import listed, printable
+from tvident._commands.channels import channels_in
+from tvident._files import increasing_times, joint_of, listed, printable, time_channels
+from tvident._units import named_unit
+
+TIME = "time"
+"""What the stamps of a joint are called in a bag."""
 
 
 def named(options: Mapping[str, Any], file: str | None) -> dict[str, Any]:
@@ -26,29 +30,38 @@ def named(options: Mapping[str, Any], file: str | None) -> dict[str, Any]:
             there = file is not None and Path(file).exists()
             held = f"; {printable(file)} has {listed(channels_in(file))}" if there else ""
             raise click.UsageError(
-                f"Missing option '--{missing[0]}'{held}; name the channel, or a --joint of a ROS bag"
+                f"Missing option '--{missing[0]}'{held}; name the channel, or a --joint of a robot's log"
             )
         return dict(options)
     if len(missing) < 2:  # noqa: PLR2004 - angle and torque
         raise click.UsageError("--joint stands for --angle and --torque; got one of these too; drop it")
     of_joint = {"angle": f"{joint}.position", "torque": f"{joint}.effort"}
     if not any(options.get(name) for name in ("sample_rate", "delta", "time_channel")):
-        of_joint["time_channel"] = "time"
+        of_joint["time_channel"] = TIME
     return {**options, **of_joint}
 
 
-def with_velocity(options: Mapping[str, Any], channels: recordings.Channels, file: str | None) -> dict[str, Any]:
-    """Return options with the velocity of a joint, where none is named and the file has one beside its angle."""
+def with_joint(options: Mapping[str, Any], channels: recordings.Channels, file: str | None) -> dict[str, Any]:
+    """Return options with the names that the channels of a joint have in a file, and its velocity where none is named."""
     rest = {name: value for name, value in options.items() if name != "joint"}
     joint = options["joint"]
-    if joint is None or rest["velocity"] is not None:
+    if joint is None:
         return rest
-    name = f"{joint}.velocity"
-    try:
-        velocity, angle = (source_of(channels, one, file) for one in (name, rest["angle"]))
-    except (KeyError, click.UsageError):
+    of_joint = joint_of(channels, joint, file or "the command line")
+    rest |= {"angle": of_joint["position"], "torque": of_joint["effort"]}
+    if rest["time_channel"] == TIME and not any(_last(name) == TIME for name in channels):
+        clocks = list(dict.fromkeys(time_channels(channels)))
+        clocks = clocks or [named_unit(name)[0] for name in increasing_times(channels)]
+        # Of several none is chosen: what asks for the sample period names them.
+        rest["time_channel"] = clocks[0] if len(clocks) == 1 else None
+    if "velocity" not in rest or rest["velocity"] is not None or "velocity" not in of_joint:
         return rest
+    velocity, angle = channels[of_joint["velocity"]], channels[of_joint["position"]]
     # Drivers that measure no velocity send zeros, or no number, in its place.
     if velocity.shape != angle.shape or not np.any(np.nan_to_num(velocity)):
         return rest
-    return rest | {"velocity": name}
+    return rest | {"velocity": of_joint["velocity"]}
+
+
+def _last(name: str) -> str:
+    return named_unit(name)[0].rpartition(".")[2]

@@ -12,7 +12,7 @@ import click
 from tvident import _report, recordings
 from tvident._commands.channels import channels_in, source_of
 from tvident._commands.identification import identified, inputs
-from tvident._commands.named import named, with_velocity
+from tvident._commands.named import named, with_joint
 from tvident._commands.output import REPORT, RESULTS, check_outputs, end_without_result, say
 from tvident._commands.words import in_options
 from tvident._files import full_name, printable
@@ -29,7 +29,7 @@ def report(file: str | None, output: str, **options: Any) -> None:
     options = named(options, file)
     check_outputs({RESULTS if output == "-" else REPORT: output}, inputs(file, options))
     channels = channels_in(file)
-    options = with_velocity(options, channels, file)
+    options = with_joint(options, channels, file)
     result = identified(channels, file, **options)
     used = {
         full_name(channels, options[name], "")

@@ -16,6 +16,8 @@ from tvident._files.unpacked import ending_of
 
 if TYPE_CHECKING:
     from tvident._files.beginnings import ending_by
+    from tvident._files.counts import counters
+    from tvident._files.joints import joint_of
     from tvident._files.no_values import marks_given, without_marks
     from tvident._files.rates import other_rate
     from tvident._files.recorded import FileRecording, increasing_times, read_recording, said_otherwise, time_channels
@@ -38,11 +40,13 @@ __all__ = [
     "check_folder",
     "check_place",
     "copy_text",
+    "counters",
     "ending_by",
     "ending_of",
     "errors_name",
     "full_name",
     "increasing_times",
+    "joint_of",
     "keeps_result",
     "listed",
     "marks_given",
@@ -68,7 +72,9 @@ __all__ = [
 ]
 
 _READERS = {
+    "counters": "counts",
     "ending_by": "beginnings",
+    "joint_of": "joints",
     "marks_given": "no_values",
     "other_rate": "rates",
     "without_marks": "no_values",

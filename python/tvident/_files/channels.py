@@ -95,6 +95,8 @@ class FileWarning(UserWarning):
     """
 
 
+_BETWEEN_PARTS = re.compile(r"[./\[\]]+")
+
 MOST_CHANNELS = 10_000
 """Channels of a file. More are samples."""
 
@@ -161,17 +163,11 @@ def full_name(channels: Mapping[str, Any], name: str, source: str) -> str:
         return inside[0]
     if not same and not inside:
         # Whoever types a name by hand may not care for capitals; where two channels differ by these alone, nothing is guessed.
-        folded = [key for key in channels if name.casefold() in {key.casefold(), named_unit(key)[0].casefold()}]
-        if len(folded) == 1:
-            return folded[0]
-        same = folded
-    # Who knows the file writes its groups with slashes.
-    dotted = name.strip("/").replace("/", ".")
-    if not same and dotted not in {"", name} and not _NUMBER.fullmatch(dotted):
-        with suppress(KeyError):
-            return full_name(channels, dotted, source)
+        same = [key for key in channels if name.casefold() in {key.casefold(), named_unit(key)[0].casefold()}]
+    same = same or inside or _written_otherwise(channels, name)
+    if len(same) == 1 and not inside:
+        return same[0]
     place, asked = printable(source), printable(name)
-    same = same or inside
     if same:
         raise KeyError(
             f"{place} must have one channel '{asked}'; it has {listed(same)}; name one of these as it is written here"
@@ -179,6 +175,21 @@ def full_name(channels: Mapping[str, Any], name: str, source: str) -> str:
     if _NUMBER.fullmatch(name) and int(name) < len(channels):
         return list(channels)[int(name)]
     raise KeyError(f"{place} has no channel '{asked}'; it has {listed(channels)}; use one of these or a number from 0")
+
+
+def _written_otherwise(channels: Mapping[str, Any], name: str) -> list[str]:
+    """Return the channels of this name where their groups are written in another way: ``/arm/q``, ``arm.q``; ``q[0]``, ``q.0``."""
+    dotted = name.strip("/").replace("/", ".")
+    if dotted not in {"", name} and not _NUMBER.fullmatch(dotted):
+        with suppress(KeyError):
+            return [full_name(channels, dotted, "")]
+    parts = parts_of(name)
+    return [key for key in channels if len(parts) > 1 and parts_of(named_unit(key)[0])[-len(parts) :] == parts]
+
+
+def parts_of(name: str) -> list[str]:
+    """Return the parts of a name between points, slashes and square brackets."""
+    return [part for part in _BETWEEN_PARTS.split(name) if part]
 
 
 def _behind_samples(channels: Mapping[str, Any], name: str) -> list[str]:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from tvident import _arguments as arguments
 from tvident._files.channels import Channels, FileWarning, full_name
+from tvident._files.counts import counters
 from tvident._files.names import listed, printable
 from tvident._files.recordings import read
 from tvident._files.stated import stated_rate
@@ -221,9 +222,10 @@ class FileRecording(Mapping[str, Channel]):
         found = [name for name, values in long.items() if arguments.is_time(name, values.unit)]
         # Structures and groups put their names before those of their channels.
         grouped = [name for name, values in long.items() if arguments.is_time(name.rpartition(".")[2], values.unit)]
-        # A clock that is called more closely, as that of the system, may have begun long before.
-        found.sort(key=len)
-        alike = [name for name in found if _NUMBERED.sub("", name) == _NUMBERED.sub("", found[0])]
+        # A clock that is called more closely, as that of the system, may have begun long before; of two such none comes first.
+        found.sort(key=lambda name: (arguments.is_of_one_clock(name), len(name)))
+        is_closer = bool(found) and arguments.is_of_one_clock(found[0])
+        alike = [name for name in found if is_closer or _NUMBERED.sub("", name) == _NUMBERED.sub("", found[0])]
         called = alike or (grouped if len(grouped) == 1 else increasing_times(long))
         # Groups that were sampled together have one clock.
         called = called[:1] if all(_is_one_clock(long[called[0]], long[name]) for name in called[1:]) else called
@@ -235,6 +237,10 @@ class FileRecording(Mapping[str, Channel]):
             bare = name.rpartition(".")[2]
             if values.ndim and arguments.is_called_time(bare) and not arguments.is_time(bare, values.unit):
                 return f"{values.unit!r} of {name!r} is no unit of time, or may mean several: call it '{name} [ms]', say, or "
+        for name, step in counters(self._full):
+            bare = self._names[name]
+            counted = f"{bare!r} goes up by {step} from sample to sample"
+            return f"{counted}: give t=recording[{bare!r}] and time_unit='ms' if it counts milliseconds, or "
         return ""
 
     def select(self, t0: float, t1: float) -> FileRecording:
