@@ -55,6 +55,8 @@ def parts(*, with_date: bool, whole_seconds: bool) -> list[npt.NDArray[Any]]:
         ("yyyy,mm,dd,hh,mm,ss,fff", True, True),
         ("time_hour,time_min,time_sec,time_millisecond", False, True),
         ("Stunde,Minute,Sekunde", False, False),
+        ("heure,minute,seconde,millisecondes", False, True),
+        ("hora,minuto,segundo,milisegundo", False, True),
     ],
 )
 def test_hours_minutes_and_seconds_are_one_clock_over_midnight(

@@ -35,6 +35,9 @@ def written(folder: Path, columns: Mapping[str, npt.NDArray[Any]]) -> Path:
         ("Unix", "usec", 10**6, "time [s]"),
         ("header.stamp.secs", "header.stamp.nsecs", 10**9, "header.stamp.time [s]"),
         ("stamp.sec", "stamp.nanosec", 10**9, "stamp.time [s]"),
+        ("segundos", "milisegundos", 1000, "time [s]"),
+        ("utc_sec", "utc_micros", 10**6, "time [s]"),
+        ("ss", "fff", 1000, "time [s]"),
     ],
 )
 @pytest.mark.parametrize("begin", [0, 1_700_000_000])

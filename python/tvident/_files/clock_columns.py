@@ -11,13 +11,12 @@ import numpy.typing as npt
 from tvident._arguments import is_called_time
 from tvident._files.channels import Channels, Say
 from tvident._files.names import listed, printable
+from tvident._files.second_words import PARTS, PER_SECOND, SECOND, without_clock
 from tvident._units import named_unit
 
 Numbers = npt.NDArray[np.float64]
 
 _DATE, _CLOCK = ("year", "month", "day"), ("hour", "minute", "second")
-
-_BEFORE = re.compile(r"(?:t|ts|time|stamp|time_?stamp|clock|date|utc|gps|local|sys|system|rtc)[_ ](?=.)", re.IGNORECASE)
 
 _CALLED = {
     "year": re.compile(r"y|yr|years?|yyyy|jahr|ann[ée]e|año|ano|anno|jaar", re.IGNORECASE),
@@ -25,10 +24,8 @@ _CALLED = {
     "day": re.compile(r"d|dd|days?|tag|jour|d[ií]a|giorno|dag", re.IGNORECASE),
     "hour": re.compile(r"h|hh|hrs?|hours?|std|stunden?|heures?|horas?|ore|ora|uur", re.IGNORECASE),
     "minute": re.compile(r"m|mm|(?i:mi|min|mins|minutes?|minuten?|minutos?|minut[io])"),
-    "second": re.compile(r"s|ss|secs?|seconds?|sek|sekunden?|secondes?|segundos?|second[io]|seconden", re.IGNORECASE),
-    "millisecond": re.compile(r"f{3}|zzz|ms|msecs?|millis|milli[_ ]?seconds?|millisekunden?", re.IGNORECASE),
-    "microsecond": re.compile(r"f{6}|[uµμ]s|[uµμ]secs?|micros|micro[_ ]?seconds?|mikrosekunden?", re.IGNORECASE),
-    "nanosecond": re.compile(r"f{9}|ns|nsecs?|nanos|nano[_ ]?seconds?|nanosekunden?", re.IGNORECASE),
+    "second": SECOND,
+    **PARTS,
 }
 """What columns of a clock are called: where a date stands beside, m may be the month, M the minute."""
 
@@ -37,9 +34,6 @@ _AGAIN = re.compile(r"_\d+$")
 
 _LEAST = 3
 """Letters of a name without hours: m and s alone may be anything."""
-
-_PARTS = {"millisecond": 1e3, "microsecond": 1e6, "nanosecond": 1e9}
-"""How many there are in a second."""
 
 _LEAST_AND_MOST = {
     "year": (0, 9999),
@@ -89,7 +83,7 @@ def _clocks(channels: Channels) -> Iterator[tuple[str, Mapping[str, str]]]:
             group, dot, bare = called.rpartition(".")
             # Of time_sec the unit says which part it is.
             groups.setdefault(group + dot, []).append(
-                (name, unit if is_called_time(bare) and name.endswith(f"_{unit}") else _BEFORE.sub("", bare))
+                (name, unit if is_called_time(bare) and name.endswith(f"_{unit}") else without_clock(bare))
             )
     for group, names in groups.items():
         one = _parts(names)
@@ -119,7 +113,7 @@ def _parts(names: Sequence[tuple[str, str]]) -> dict[str, str]:
 
 def _whole(found: Mapping[str, str]) -> Mapping[str, str]:
     """Return the parts of a clock without what does not go with the others: a date lacks nothing, and has hours."""
-    parts: Sequence[str] = [*_CLOCK, *_PARTS] if "hour" in found else [*_CLOCK[1:], *_PARTS]
+    parts: Sequence[str] = [*_CLOCK, *PER_SECOND] if "hour" in found else [*_CLOCK[1:], *PER_SECOND]
     if "hour" in found and set(_DATE) <= found.keys():
         parts = [*_DATE, *parts]
     return {part: found[part] for part in parts if part in found}
@@ -130,13 +124,15 @@ def _seconds(parts: Mapping[str, npt.NDArray[np.number]]) -> tuple[str, Numbers]
     columns = {part: np.asarray(values, np.float64) for part, values in parts.items()}
     last = next(reversed(columns))
     for part, values in columns.items():
-        least, most = _LEAST_AND_MOST.get(part, (0, _PARTS.get(part, 1) - 1))
+        least, most = _LEAST_AND_MOST.get(part, (0, PER_SECOND.get(part, 1) - 1))
         if not (values >= least).all() or not (values < most + 1).all():
             return None
         if part != last and (values != np.floor(values)).any():
             return None
     minutes = columns["minute"] * 60
-    fractions = sum((columns[part] / per_second for part, per_second in _PARTS.items() if part in columns), np.zeros(1))
+    fractions = sum(
+        (columns[part] / per_second for part, per_second in PER_SECOND.items() if part in columns), np.zeros(1)
+    )
     times = columns.get("hour", np.zeros(1)) * _HOUR + minutes + columns["second"] + fractions
     if "day" in columns:
         days = _days(columns)

@@ -10,19 +10,11 @@ import numpy.typing as npt
 from tvident._arguments import is_called_time
 from tvident._files.channels import Channels, Say
 from tvident._files.names import printable
+from tvident._files.second_words import PARTS, PER_SECOND, SECOND, without_clock
 from tvident._units import named_unit, with_unit
 
-_SECONDS = re.compile(r"s|secs?|seconds?|sekunden?|unix|epoch|unix[_ ]?time", re.IGNORECASE)
-"""What whole seconds are called beside what times are called."""
-
-_BEFORE = r"(?:(?:t|ts|time|time_?stamp|stamp|clock)[_ ])?"
-
-_PARTS = {
-    re.compile(rf"{_BEFORE}(?:m|milli[_ ]?)s(?:ecs?|econds?|ekunden?)?", re.IGNORECASE): 1e3,
-    re.compile(rf"{_BEFORE}(?:[uµμ]|micro[_ ]?|mikro)s(?:ecs?|econds?|ekunden?)?", re.IGNORECASE): 1e6,
-    re.compile(rf"{_BEFORE}(?:n|nano[_ ]?)s(?:ecs?|econds?|ekunden?)?", re.IGNORECASE): 1e9,
-}
-"""How parts of a second are called, and how many there are in one."""
+_SINCE_1970 = re.compile(r"unix|epoch|unix[_ ]?time", re.IGNORECASE)
+"""What whole seconds are called, too."""
 
 _AS_LONG = 3.0
 """How much longer than all other steps those to a new second may be."""
@@ -66,8 +58,8 @@ def _parts_of_seconds(channels: Channels) -> list[tuple[str, float]]:
     found = []
     for name in channels:
         bare, unit = named_unit(name)
-        said = unit or bare.rpartition(".")[2]
-        found += [(name, per_second) for pattern, per_second in _PARTS.items() if pattern.fullmatch(said)]
+        said = without_clock(unit or bare.rpartition(".")[2])
+        found += [(name, PER_SECOND[part]) for part, pattern in PARTS.items() if pattern.fullmatch(said)]
     return found
 
 
@@ -78,8 +70,11 @@ def _together(channels: Channels, seconds: str, parts: str, per_second: float) -
     """
     bare, unit = named_unit(seconds)
     group, _, last = bare.rpartition(".")
-    is_called = is_called_time(last) or _SECONDS.fullmatch(last) is not None
-    is_second = not unit or _SECONDS.fullmatch(unit) is not None
+    whole_name = without_clock(seconds.rpartition(".")[2])
+    is_called = any(
+        (is_called_time(last), SECOND.fullmatch(last), SECOND.fullmatch(whole_name), _SINCE_1970.fullmatch(last))
+    )
+    is_second = not unit or SECOND.fullmatch(unit) is not None
     if seconds == parts or not is_called or not is_second or group != named_unit(parts)[0].rpartition(".")[0]:
         return None
     whole, part = channels[seconds], channels[parts]
