@@ -50,10 +50,47 @@ def test_a_sign_that_no_machine_has_comes_with_its_cure(
 
 
 def test_what_nothing_explains_is_to_be_looked_at_in_memory(tmp_path: Path) -> None:
-    found = told_by(*swapped(), tmp_path, method="paper")
+    found = told_by(*swapped(), tmp_path, method="paper", stiffness=-5.0)
     assert found.verdict.startswith("do not trust: ")
     assert found.verdict.endswith("see what to do")
     assert "identify a stretch of it in memory" in found.advice[0]
+
+
+CALLS = pytest.mark.parametrize(
+    "call", [{}, {"method": "paper"}, {"method": tvident.StrongForm()}], ids=["weak", "paper", "strong"]
+)
+
+
+@CALLS
+@pytest.mark.parametrize("is_cut", [False, True])
+def test_swapped_channels_are_named_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: dict[str, Any], is_cut: bool
+) -> None:
+    """In strong form, and of several pieces, a lag was asked about, or nothing was."""
+    if is_cut:
+        cut_small(monkeypatch, tmp_path)
+        rig = tvident.simulate_torsional_rig(duration=60.0)
+        recording = rig.torque, rig.angle
+    else:
+        recording = swapped()
+    if is_cut and not call:
+        with pytest.raises(
+            ValueError, match=r"none of 3 stretches determines a parameter; .*; are the channels of angle"
+        ):
+            told_by(*recording, tmp_path)
+        return
+    found = told_by(*recording, tmp_path, **call)
+    assert "known to" not in found.verdict
+    assert found.advice[0].startswith("are the channels of angle and torque swapped? With one in the other's place")
+    assert sum("swapped?" in line for line in found.advice) == 1
+
+
+@CALLS
+@pytest.mark.parametrize("sign", [1, -1])
+def test_channels_in_their_places_are_not_said_to_be_swapped(tmp_path: Path, call: dict[str, Any], sign: int) -> None:
+    rig = tvident.simulate_torsional_rig(duration=20.0)
+    found = told_by(rig.angle[20:], sign * rig.torque[:-20], tmp_path, **call)  # late, and reversed
+    assert not any("With one in the other's place" in line for line in found.advice)
 
 
 def jittering_sweep(rate: float) -> Recording:

@@ -7,7 +7,7 @@ from tvident._advice.expansion import FoundExpansion, found_expansion, words_of_
 from tvident._advice.gains import changes_of_gain
 from tvident._advice.instrument import fed_back_in_records, words_with_instrument
 from tvident._advice.marks import Numbers, marks_that_stay, without_masked_marks
-from tvident._advice.plausible import Plausible, asked_of_signs, certain_sign
+from tvident._advice.plausible import SWAPPED, Plausible, asked_of_signs, certain_sign
 from tvident._advice.search import FoundBySearch, words_of_search
 from tvident._advice.strong import ExplainedStrong
 from tvident._advice.undescribed import LAG_NOT_TOLD, in_vain, none_there
@@ -17,6 +17,7 @@ __all__ = [
     "FREE_OFFSET",
     "LAG_NOT_TOLD",
     "NOT_DISTINGUISHED",
+    "SWAPPED",
     "Explained",
     "ExplainedStrong",
     "FoundBySearch",

@@ -13,6 +13,9 @@ from tvident._arguments import MAY_BE_DAYS, listed, marks_in, told_once
 from tvident._results import Estimates, Words
 from tvident._units import ROTARY, Axis
 
+SWAPPED = "are the channels of angle and torque swapped?"
+"""How a question begins."""
+
 _ONE_TURN = 2 * math.pi
 """An angle in rad that moves by more, to both sides, may be in degrees."""
 
@@ -180,7 +183,7 @@ def asked_of_signs(sign: Mapping[str, int]) -> list[str]:
     if not negative:
         return []
     if sign["inertia"] < 0 < sign["stiffness"]:
-        return ["inertia is negative and stiffness positive: are the channels of angle and torque swapped?"]
+        return [f"inertia is negative and stiffness positive: {SWAPPED}"]
     if sign["inertia"] < 0:
         words = listed(negative)
         question = f"{words} {'are' if len(negative) > 1 else 'is'} negative: is the torque's sign reversed, are the channels swapped?"

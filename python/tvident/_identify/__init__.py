@@ -2,6 +2,7 @@
 
 from tvident._identify.call import identify
 from tvident._identify.criterion import aicc, effective_observations
+from tvident._identify.exchanged import asked_of_exchanged, takes_work
 from tvident._identify.methods import Method, StrongForm, WeakForm
 from tvident._identify.offered import contradicted
 from tvident._identify.parts import Held, Long, Rows, Span, estimate_part, identify_part, requested
@@ -21,6 +22,7 @@ __all__ = [
     "StrongForm",
     "WeakForm",
     "aicc",
+    "asked_of_exchanged",
     "contradicted",
     "effective_observations",
     "estimate_part",
@@ -28,4 +30,5 @@ __all__ = [
     "identify_part",
     "requested",
     "resolve",
+    "takes_work",
 ]

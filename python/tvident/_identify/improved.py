@@ -11,14 +11,13 @@ import numpy as np
 
 from tvident import _core
 from tvident._advice import NOT_DISTINGUISHED, Explained, in_vain
-from tvident._arguments import percent
 from tvident._clocks import bridged
 from tvident._equation import BUILT_IN, COEFFICIENTS, FRICTION, OFFSET, Unknown
 from tvident._identify.data import Data, cut
+from tvident._identify.exchanged import asked_of_exchanged, takes_work
 from tvident._identify.free_offset import without_worse_offset
-from tvident._identify.left_over import unexplained
 from tvident._identify.methods import StrongForm, WeakForm
-from tvident._identify.offered import BEYOND_CHANCE, NEXT_TO_NOTHING, contradicted, is_right
+from tvident._identify.offered import NEXT_TO_NOTHING, contradicted, is_right
 from tvident._identify.remedies import Trial
 from tvident._identify.settings import Request, resolve
 from tvident._identify.signals import with_own_step
@@ -51,12 +50,6 @@ _SHORT = 1 << 16
 
 _READ = 1 << 11
 """Samples of a part that tell how busy it is."""
-
-_MUCH_BETTER = 0.1
-"""Swapped channels leave at most this part of what is unpredicted."""
-
-_BLOCKS = 16
-"""Blocks of a record whose work is compared."""
 
 _DOUBTED = (
     Status.TERM_SUSPECTED | Status.LAG_SUSPECTED | Status.NOISE_MODEL | Status.WINDOW_LIMIT | Status.SCALES_DISAGREE
@@ -252,19 +245,6 @@ def _busiest(data: Data, length: int) -> slice:
     return slice(first, first + length)
 
 
-@np.errstate(all="ignore")  # of what is beyond doubles nothing is told
-def _takes_work(data: Data) -> bool:
-    """Return whether the torque does work on the motion beyond chance: with the channels exchanged damping would be negative.
-
-    The integral of the angle by the torque is that of the torque by the angle with the other sign.
-    """
-    angle, torque = (channel.astype(np.float64) for channel in (data.angles, data.torques))
-    work = torque[1:-1] * (angle[2:] - angle[:-2])
-    is_there = np.isfinite(work) if data.mask is None else np.isfinite(work) & data.mask[1:-1]
-    blocks = np.array([block.sum() for block in np.array_split(np.where(is_there, work, 0.0), _BLOCKS)])
-    return bool(blocks.mean() > BEYOND_CHANCE * blocks.std(ddof=1) / np.sqrt(_BLOCKS))
-
-
 @dataclass(frozen=True)
 class Improvement(_AskedOfRecord):
     """A single record, and how to identify it with another equation.
@@ -368,40 +348,27 @@ class Improvement(_AskedOfRecord):
         return is_new and is_usual and self.data.step == 1 and asked.lag != "auto" and asked.form == WeakForm()
 
     def _exchanged(self, result: Identification) -> str | None:
-        """Return the question whether channels are swapped, where that explains next to everything with positive parameters.
-
-        Of channels in their places exchanging gives a negative damping, however slow the motion is.
-        """
+        """Return the question whether channels are swapped; None where nothing says so."""
         data = self.data
-        if data.motion.recorded or not all(isinstance(kind, str) for kind in self.given.values()) or _takes_work(data):
+        if data.motion.recorded or not all(isinstance(kind, str) for kind in self.given.values()):
+            return None
+        if takes_work(data.angles, data.torques, data.mask):
             return None
         channels = replace(
             data, angles=data.torques, torques=data.angles, passed=data.passed[::-1], labels=None, doubts=(), step=1
         )
+        part = self._busiest_part
 
-        def exchanged(stiffness: str, some: Data) -> Identification:
+        def exchanged(stiffness: str) -> Identification:
             kinds = {"inertia": "constant", "damping": "constant", "stiffness": stiffness}
             request = resolve(WeakForm(), {**kinds, "terms": [OFFSET], "lag": 0.0}, None, 1 / data.period)
-            return self.run(request, some, diagnose=False)
+            if part is None:
+                return self.run(request, channels, diagnose=False)
+            found = self.run(request, channels.stretch(part), diagnose=False)
+            is_all = stiffness == "windowed" and is_right(found)
+            return self.run(request, channels, diagnose=False) if is_all else found
 
-        part = self._busiest_part
-        some = channels if part is None else channels.stretch(part)
-        try:
-            # Where constants alone predict nothing of it nothing is swapped, and to look for all that may change there takes long.
-            if not unexplained(exchanged("constant", some)).share < 1:
-                return None
-            found = exchanged("windowed", some)
-            if part is not None and is_right(found):
-                found = exchanged("windowed", channels)
-        except ValueError:
-            return None
-        left = unexplained(found).share
-        if not (is_right(found) and left <= NEXT_TO_NOTHING and left <= _MUCH_BETTER * unexplained(result).share):
-            return None
-        return (
-            f"are the channels of angle and torque swapped? With one in the other's place inertia, damping and stiffness are positive, "
-            f"and {percent(1 - left)} {TRIED}: exchange them"
-        )
+        return asked_of_exchanged(exchanged, lambda: result)
 
     @cached_property
     def _explained(self) -> Explained:

@@ -28,6 +28,8 @@ from tvident._units import in_words_of
 _LOOK = "identify a stretch of it in memory, of read_recording(…).select(0, 60), say: its summary() tries what would explain that"
 """What to do where nothing else was found."""
 
+_MOSTLY = 0.5
+
 
 @dataclass(frozen=True)
 class JudgedRows:
@@ -91,14 +93,23 @@ class JudgedRows:
             or found_elsewhere(self.advice)
         )
 
+    @property
+    def is_doubted(self) -> bool:
+        """Whether nothing is to be trusted, or the stiffness is sought and less than its error at most rows."""
+        values, errors = self.stiffness, self.stderr["stiffness"]
+        known = np.isfinite(values) & np.isfinite(errors)
+        lost = int(np.count_nonzero(errors[known] > np.abs(values[known])))
+        is_sought = self.settings["kinds"]["stiffness"] != "known"
+        return self._reason is not None or bool(is_sought and lost > _MOSTLY * int(np.count_nonzero(known)))
+
     def verdict(self) -> str:
         """Return how well parameters are known, or why not to trust them."""
         reason = self._reason
         words = verdict_of_distrusted(self, reason) if reason else verdict_of_trusted(self, how_well_known(self), None)
         return in_words_of(self.units, words)
 
-    def with_cure(self) -> JudgedRows:
-        """Return the same with what explains a sign that no machine has before its advice, and with advice where nothing is trusted."""
+    def with_cure(self, first: Sequence[str] = ()) -> JudgedRows:
+        """Return the same with what comes first and what explains a sign that no machine has before its advice, and never without any."""
         kinds = self.settings["kinds"]
         signs = {
             name: certain_sign(getattr(self, name), self.stderr[name]) if kinds[name] != "known" else 0
@@ -107,5 +118,5 @@ class JudgedRows:
         asked = [in_words_of(self.units, line) for line in asked_of_signs(signs)]
         # Stretches may have said it, in the same words behind other names.
         unsaid = [line for line in asked if not any(line.partition(": ")[2] in one for one in self.advice)]
-        advice = [*unsaid, *self.advice]
+        advice = [*first, *unsaid, *self.advice]
         return replace(self, advice=advice or ([_LOOK] if self._reason else []))

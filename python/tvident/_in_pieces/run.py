@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from tvident import _core
+from tvident._advice import SWAPPED
 from tvident._equation import LINEAR_UNITS, UNITS
 from tvident._files import errors_name, put_in_place
 from tvident._identify import Long, Span, WeakForm, requested
@@ -22,7 +23,8 @@ from tvident._in_pieces.kept import Kept
 from tvident._in_pieces.outputs import CHUNK, OutputTable, head_of_rows, holds_rows, writer
 from tvident._in_pieces.recorded import RecordingOfFile
 from tvident._in_pieces.rows import row_of
-from tvident._in_pieces.told_by_weak_form import ToldByWeakForm
+from tvident._in_pieces.swapped import asked_if_swapped
+from tvident._in_pieces.told_by_weak_form import ToldByWeakForm, stretches_told
 from tvident._in_pieces.work import Alone, WindowsWork, Work
 from tvident._pieces import SHARED, Columns, Given, Mean, means_of, reach_of
 from tvident._status import Status
@@ -175,7 +177,10 @@ class Run:
             self._kept.note_fact("settings", dict(asked.given.frozen))
             return
         spans = stretches(self._samples, asked.step)
-        choices = chosen(spans, asked.recording.held, asked.given.identified, asked.recording.period)
+        try:
+            choices = chosen(spans, asked.recording.held, asked.given.identified, asked.recording.period)
+        except ValueError as error:
+            raise ValueError("; ".join([str(error), *self._asked_if_swapped()])) from None
         self._kept.note_fact("advice", choices.advice)
         self._kept.note_fact("record_status", choices.record_status)
         self._kept.note_fact("settings", choices.settings)
@@ -198,7 +203,9 @@ class Run:
         advice = [*self._told_by_weak_form(work, means), *advice]
         verdict = "no verdict: there are no rows"
         if self._kept.count:
-            judged = JudgedRows(self._some_rows(work, means), status, advice, settings, self._asked.units).with_cure()
+            judged = JudgedRows(self._some_rows(work, means), status, advice, settings, self._asked.units)
+            is_asked = judged.is_doubted and not any(SWAPPED in line for line in advice)
+            judged = judged.with_cure(self._asked_if_swapped() if is_asked else ())
             verdict, advice = judged.verdict(), list(judged.advice)
         told = {"settings": settings, "constants": constants, "record_status": int(status), "advice": advice}
         told["verdict"] = verdict
@@ -231,6 +238,13 @@ class Run:
 
         told = ToldByWeakForm(long, asked.given, asked.recording.held, rows, asked.recording.begin, asked.units)
         return told.advice(self._samples)
+
+    def _asked_if_swapped(self) -> list[str]:
+        asked, long = self._asked, self._asked.long
+        if asked.given.weighted:
+            return []
+        equation = asked.given.equation if long is None else long.in_weak_form
+        return asked_if_swapped(asked.given, equation, asked.recording.held, stretches_told(self._samples))
 
     def _some_rows(self, work: Work, means: Mapping[str, Mean]) -> Columns:
         """Return rows that are spread over the result."""
