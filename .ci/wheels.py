@@ -87,8 +87,9 @@ def has_target(target: str) -> bool:
     known = run("rustc", "--print", "target-libdir", "--target", target).strip()
     if Path(known).is_dir():
         return True
-    asked = subprocess.run(["rustup", "target", "add", target], check=False)
-    return asked.returncode == 0
+    # Without rustup the compiler came with the system, whose packages hold other targets.
+    rustup = shutil.which("rustup")
+    return rustup is not None and subprocess.run([rustup, "target", "add", target], check=False).returncode == 0
 
 
 def build(unpacked: Path, out: Path, target: str | None, interpreter: str | None = None) -> Path:
@@ -232,7 +233,10 @@ def main() -> None:
             wheels.append(build(unpacked, given.out.resolve(), target, threads))
     _check_and_try(wheels, given.tests, threads)
     for target in absent:
-        print(f"No wheel for {target}: rustup could not fetch Rust's standard library for it")
+        print(
+            f"No wheel for {target}: rustup could not fetch Rust's standard library for it, which needs a network: "
+            f"rustup target add {target}, then make wheels again"
+        )
     if threads is None:
         print(f"No free-threaded Python here ({' or '.join(FREE_THREADED)}): no wheel for it")
 

@@ -23,7 +23,7 @@ _CLOSER = (
 """What times are called that say whose clock they are of."""
 
 _CALLED = re.compile(
-    r"_{0,2}(t|tout|time|times|zeit|temps|tiempo|tempo|x_value|timestamps?|stamp|elapsed( time)?|time_?stamp"
+    r"_{0,2}(t|tout|time|times|zeit|temps|tiempo|tempo|x_value|timestamps?|stamp|elapsed( time)?|time[_ ]?stamp"
     rf"|{_CLOSER})([ _.-]?\d+)?",
     re.IGNORECASE,
 )

@@ -41,6 +41,12 @@ _ROUNDINGS = 4
 _FEW_TIMES = 100
 """Times of which a step is asked first: they deny most steps."""
 
+_FEW_BEHIND = 8
+"""Rows behind the last sample, at most, that programs write below their numbers."""
+
+_TURNS = 2
+"""How often a counter begins again, at least, for that to be seen."""
+
 _FINE = 0.25
 """Of a period: the largest step of times whose digits behind the point differ."""
 
@@ -247,9 +253,31 @@ def _not_increasing(seconds: Seconds) -> ValueError:
             f"t must increase; t[{place}] = {now!r} is that of the sample before; leave one of the two out, or give sample_rate= instead "
             "of t if samples were taken evenly"
         )
-    return ValueError(
-        f"t must increase; t[{place}] = {now!r} comes after t[{place - 1}] = {before!r}; sort the samples by time, or cut the record where "
-        f"its clock was set back{clock_changed(now - before)}"
+    cure = _cure_of_counter(seconds) or (
+        f"sort the samples by time, or cut the record where its clock was set back{clock_changed(now - before)}"
+    )
+    behind = seconds.size - place
+    if behind <= _FEW_BEHIND and seconds.size > _FEW_TIMES:
+        rows = (
+            "row, if it is no sample but a mean" if behind == 1 else f"{behind} rows, if they are no samples but means"
+        )
+        cure += f", or leave out the last {rows}, say"
+    return ValueError(f"t must increase; t[{place}] = {now!r} comes after t[{place - 1}] = {before!r}; {cure}")
+
+
+def _cure_of_counter(seconds: Seconds) -> str:
+    """Return what to do about a counter that begins again and again after the same time; nothing where there is none."""
+    steps = np.diff(seconds)
+    back = steps < 0
+    usual = float(np.median(steps))
+    # The step over a turn is as any other, and the turn is taken off.
+    turns = usual - steps[back]
+    if np.count_nonzero(back) < _TURNS or usual <= 0 or not np.ptp(turns) < usual:
+        return ""
+    turn = float(np.median(turns))
+    return (
+        f"it goes back {turns.size} times by the same, as a counter does that begins again after {turn:.6g} s: unwrap it by that "
+        f"(numpy.unwrap), or give sample_rate={1 / usual:.6g} if samples were taken evenly"
     )
 
 
