@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tvident
+from tvident._arguments import to_digits_of, with_error
 
 Y = np.sin(np.arange(300) / 20)
 
@@ -72,3 +73,11 @@ def test_numbers_of_numpy_are_shown_as_numbers() -> None:
         tvident.fit_local_polynomials(Y, 31, step=np.int64(-3))  # type: ignore[arg-type] # which NumPy's integers are
     with pytest.raises(TypeError, match=r"step must be a whole number; got 2.0; pass 2"):
         tvident.fit_local_polynomials(Y, 31, step=np.float32(2))  # type: ignore[arg-type] # likewise
+
+
+def test_what_rounds_to_zero_has_no_sign() -> None:
+    """A report showed a velocity bias of -0.0e-5."""
+    assert with_error(-1e-7, 9.2e-5) == "(0.0 ± 9.2)e-5"
+    assert with_error(-0.00004, 0.011) == "0.000 ± 0.011"
+    assert with_error(-0.4, 0.011) == "-0.400 ± 0.011"
+    assert to_digits_of(-0.00004, 0.011) == "0.000"

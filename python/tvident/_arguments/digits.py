@@ -17,10 +17,15 @@ def with_error(value: float, error: float) -> str:
     places = decimals(error)
     size = max(abs(value), error)
     if _SMALL <= size < _LARGE:
-        return f"{round(value, places):.{max(0, places)}f} ± {round(error, places):.{max(0, places)}f}"
+        return f"{_fixed(round(value, places), places)} ± {round(error, places):.{max(0, places)}f}"
     power = math.floor(math.log10(size))
     digits = max(0, places + power)
-    return f"({value / 10.0**power:.{digits}f} ± {error / 10.0**power:.{digits}f})e{power}"
+    return f"({_fixed(value / 10.0**power, digits)} ± {error / 10.0**power:.{digits}f})e{power}"
+
+
+def _fixed(value: float, digits: int) -> str:
+    """Return a number with so many digits behind the point, without a sign where they are zeros."""
+    return f"{value:z.{max(0, digits)}f}"
 
 
 def decimals(error: float) -> int:
@@ -35,7 +40,7 @@ def to_digits_of(value: float, error: float) -> str:
     if not (math.isfinite(error) and error > 0) or not _SMALL <= max(abs(value), error) < _LARGE:
         return f"{value:.5g}"
     places = decimals(error)
-    return f"{round(value, places):.{max(0, places)}f}"
+    return _fixed(round(value, places), places)
 
 
 _MOST_DIGITS = 6
