@@ -112,7 +112,7 @@ impl Session<'_, '_, '_> {
             if choice > 1 {
                 chosen = self.choose(model)?;
             }
-            let mut decided = self.decide(&mut chosen, model)?;
+            let mut decided = self.decide_with_noise(&mut chosen, model)?;
             // To be found again where no lag is: a search for what varies takes longest of all.
             if self.options.lag.is_none() && choice == 1 && self.record.lag == 0.0 && !decided.slow.is_empty() {
                 without = Some((chosen.clone(), decided.clone(), (self.scan.clone(), self.suggested, self.noise)));
@@ -172,7 +172,7 @@ impl Session<'_, '_, '_> {
             return Ok((chosen, decided, lag));
         }
         let mut chosen = self.choose(model)?;
-        let mut decided = self.decide(&mut chosen, model)?;
+        let mut decided = self.decide_with_noise(&mut chosen, model)?;
         decided.untold_lag = untold;
         Ok((chosen, decided, lag))
     }

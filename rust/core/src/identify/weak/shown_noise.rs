@@ -33,6 +33,8 @@ use crate::weak_form::weak_rows::WeakRows;
 pub(crate) const MORE: f64 = 2.0;
 /// The same from which on downwards the channels hold signal where their noise is read.
 const LESS: f64 = 0.5;
+/// The error of predicting rows, over the variance that the noise of the channels makes, up to which they explain what is left after all.
+const EXPLAINED: f64 = 1.25;
 /// Rounds of choosing the test function with the noise that the last one showed.
 const ROUNDS: usize = 3;
 /// Steps towards the noise that one test function shows, and the part of it that the last may change it by.
@@ -96,6 +98,24 @@ impl Session<'_, '_, '_> {
         self.channel_noise[1] = self.channel_noise[1].min(torque);
         self.noise = [self.channel_noise[0], torque];
         self.choose_once(model, scans, None)
+    }
+
+    /// Decides, and where what was taken for noise of the torque is explained by what was set free, chooses and decides again with the noise of the channels.
+    pub(crate) fn decide_with_noise(&mut self, chosen: &mut Chosen, model: &Model) -> Result<Decided, Error> {
+        let decided = self.decide(chosen, model)?;
+        let is_explained = decided.error * self.raised(&chosen.weak, &decided) <= EXPLAINED;
+        if self.noise == self.channel_noise || !is_explained || self.options.shown_noise.is_some() {
+            return Ok(decided);
+        }
+        let before = (self.noise, self.scan.clone(), self.suggested);
+        let mut again = self.choose_first(model, &mut None)?;
+        let found = self.decide(&mut again, model)?;
+        if found.fit.is_some() && found.error <= MORE {
+            *chosen = again;
+            return Ok(found);
+        }
+        (self.noise, self.scan, self.suggested) = before;
+        Ok(decided)
     }
 
     /// Lowers the noise of the torque to what the equations leave, if that is far less than the noise of the channels makes. Returns whether it is.

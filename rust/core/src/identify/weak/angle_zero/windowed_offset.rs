@@ -31,6 +31,8 @@ impl Session<'_, '_, '_> {
         missed: bool,
     ) -> Result<Settled, Error> {
         let differs = constant.1.differs(offset);
+        // What was set free since may explain what a free offset was missed for.
+        self.free_offset.error = self.free_offset.error.min(constant.1.error);
         let fails = missed && constant.1.error > NOISE_MODEL_FAILS;
         if self.undecided_offset() != Some(offset) || !(differs || fails) {
             return Ok(constant);
