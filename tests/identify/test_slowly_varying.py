@@ -196,6 +196,7 @@ def test_a_term_that_is_missing_is_no_damping_that_swings(missing: str) -> None:
     [
         (("inertia", "damping"), "constant", 2, (3.3, 4.5)),
         (("inertia",), "ramp", 1, (2.1,)),
+        (("inertia",), "slider", 1, (2.1,)),
         *long((("inertia", "damping"), "slider", 1, (2.1, 2.9)), (("inertia",), "slider", 2, (3.3,))),
     ],
 )

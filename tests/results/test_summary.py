@@ -226,13 +226,28 @@ def test_a_torque_that_is_mostly_noise_is_explained_as_far_as_it_is_none() -> No
 @pytest.mark.slow
 def test_a_model_that_predicts_worse_than_a_constant_explains_nothing() -> None:
     rig = tvident.simulate_torsional_rig(duration=5.0, seed=4)
-    result = tvident.identify(rig.angle, -np.roll(rig.torque, 5), sample_rate=1000)
+    result = tvident.identify(
+        rig.angle, rig.torque, sample_rate=1000, inertia=0.05, damping="constant", stiffness="constant"
+    )
     _, recorded, predicted = result.predicted_torque()
     there = np.isfinite(predicted)
     assert np.var((recorded - predicted)[there]) > np.var(recorded[there])
     assert result.summary().startswith("do not trust: the model explains nothing of the torque; see what to do")
     assert "explains nothing of the angle simulated and 61 % predicted" in HeldBack(-16.0, 61.0).words()
     assert "explains 0 % of the angle simulated" in HeldBack(0.0, 61.0).words()
+
+
+@pytest.mark.slow
+def test_a_torque_of_the_other_sign_that_is_late_is_named() -> None:
+    """Windows that follow anything, and curves of an inertia and a damping, explained nothing of the torque, and no lag was named."""
+    rig = tvident.simulate_torsional_rig(duration=5.0, seed=4)
+    result = tvident.identify(rig.angle, -np.roll(rig.torque, 5), sample_rate=1000)
+    _, recorded, predicted = result.predicted_torque()
+    there = np.isfinite(predicted)
+    assert np.var((recorded - predicted)[there]) < 0.05 * np.var(recorded[there])
+    assert result.summary().startswith("do not trust: inertia is negative")
+    assert any(line.startswith("the torque is late by 5.0") for line in result.advice)
+    assert any("is the torque's sign reversed" in line for line in result.advice)
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -29,7 +29,7 @@ from tvident._advice.torque import OF_TORQUE, told_by_torque
 from tvident._advice.undescribed import drives, driving
 from tvident._arguments import listed
 from tvident._equation import BUILT_IN, COEFFICIENTS, OFFSET, UNITS
-from tvident._results import NOT_CONSTANT, Words
+from tvident._results import NOT_CONSTANT, UNFOLLOWED, Words
 from tvident._status import Status
 
 _SHOWN = 6
@@ -293,6 +293,11 @@ class Explained:
             words.append(
                 f"{listed(list(agreeing))} constant: noise explains the differences between eight parts of the record (p = {chances})"
             )
+        alike = [name for name, test in tests.items() if name not in agreeing and self._hardly_differs(name, test)]
+        if alike:
+            words.append(
+                f"{listed(alike)} constant: parts of the record differ by less than {_core.HARDLY_DIFFERS:.0%}"
+            )
         untested = [name for name, one in self._constants() if one.test is None]
         if untested:
             pronoun = "it" if len(untested) == 1 else "them"
@@ -372,12 +377,21 @@ class Explained:
             words.append(_BEGIN)
         return words
 
+    def _hardly_differs(self, name: str, test: Any) -> bool:
+        """Return whether a parameter that was to vary if it does differs by too little between parts of the record to contradict it."""
+        return name in COEFFICIENTS and name in self.tested and test.spread < _core.HARDLY_DIFFERS
+
     def _contradictions(self) -> list[str]:
         words = []
         for name, one in self._constants():
-            if one.test is None or one.test.probability >= _core.NO_CHANCE:
+            if one.test is None or one.test.probability >= _core.NO_CHANCE or self._hardly_differs(name, one.test):
                 continue
-            if name in COEFFICIENTS:
+            if name in COEFFICIENTS and name in self.tested:
+                words.append(
+                    f"{name}{UNFOLLOWED} ({one.test.spread:.0%}): is a friction missing, is the torque late, or was a channel filtered? "
+                    "Do not trust these numbers"
+                )
+            elif name in COEFFICIENTS:
                 kind = "windowed" if name == "stiffness" else "auto"
                 words.append(
                     f"{name}{NOT_CONSTANT} by {one.test.spread:.0%}: give {name}={kind!r}, or split the record"

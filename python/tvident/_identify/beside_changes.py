@@ -28,6 +28,9 @@ _WINDOWS = 4
 _LEAST = 4
 """Windows that a first look has at least."""
 
+_UNEXPLAINED = Status.NOISE_MODEL | Status.WINDOW_LIMIT
+"""Flags of a record that is predicted badly: the shortest windows may follow what is missing, and next to nothing is left within them."""
+
 _NARROWER = (4, 2)
 """Parts of the test function at hand that looks beside windows are taken with."""
 
@@ -93,7 +96,9 @@ class BesideChanges(TriedRecord):
 
     def _explains_noise(self, names: Names, result: Identification) -> bool:
         """Return whether a term that a look sees beside windows explains what the noise does not, and nothing else is contradicted."""
-        is_explained = self.result.record_status & Status.NOISE_MODEL and not result.record_status & CONTRADICTED
+        is_explained = self.result.record_status & _UNEXPLAINED and not result.record_status & (
+            CONTRADICTED | _UNEXPLAINED
+        )
         return bool(is_explained) and names == tuple(self._seen_beside_changes)
 
     def denied(self, suspects: Sequence[_core.Suspect]) -> dict[str, str]:
@@ -193,7 +198,7 @@ class BesideChanges(TriedRecord):
 
         What is missing has made the test function at hand wide, as slow changes are told best by; kinks are told by narrow ones.
         """
-        if not self.result.record_status & CONTRADICTED:
+        if not self.result.record_status & (CONTRADICTED | _UNEXPLAINED):
             return []
         sought = [one for one in self._sought if one != "lag"]
         for part in _NARROWER:

@@ -17,6 +17,7 @@ from tvident._results import (
     found_marked,
     how_well_known,
     mostly_flagged,
+    unfollowed,
     verdict_of_distrusted,
     verdict_of_trusted,
     why_not,
@@ -91,6 +92,7 @@ class JudgedRows:
             or why_not(self, lambda: wrong_sign(self), lambda: None)
             or mostly_flagged(self)
             or found_elsewhere(self.advice)
+            or unfollowed(self.advice)
         )
 
     @property

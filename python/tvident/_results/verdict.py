@@ -14,7 +14,7 @@ from tvident import _core
 from tvident._arguments import explained_in_words, percent, percentiles, to_digits_of, told_once
 from tvident._results.measured import number_of
 from tvident._results.torque import noise_of_compared
-from tvident._results.words import BECOMES, CONDITIONS, MARKED, OF_WEAK_FORM, OTHER_UNIT, STAYS, TRIED
+from tvident._results.words import BECOMES, CONDITIONS, MARKED, OF_WEAK_FORM, OTHER_UNIT, STAYS, TRIED, UNFOLLOWED
 from tvident._status import Status
 from tvident._units import in_words_of
 
@@ -133,6 +133,16 @@ def found_elsewhere(advice: Sequence[str]) -> str | None:
     return f"another equation explains more, and {others}"
 
 
+def unfollowed(advice: Sequence[str]) -> str | None:
+    """Return which parameters that were to vary if they do differ between parts of a record that nothing explains, in words."""
+    names = [name for name in SYMBOLS if any(f"{name}{UNFOLLOWED}" in line for line in advice)]
+    return (
+        f"{' and '.join(names)} {'differs' if len(names) == 1 else 'differ'} between parts of the record for another reason"
+        if names
+        else None
+    )
+
+
 def verdict_of_distrusted(result: Any, reason: str) -> str:
     """Return the verdict on a result that something says to distrust."""
     return f"do not trust: {reason}{'; see what to do' if result.advice else ''}"
@@ -227,6 +237,7 @@ def _distrusted(result: Any, advice: Sequence[str]) -> str | None:
         found_marked(advice)
         or why_not(result, lambda: wrong_sign(result), lambda: explained(result), lambda: _is_rest_noise(result))
         or found_elsewhere(advice)
+        or unfollowed(advice)
         or ("its arrays were written over before it was looked at" if _is_written_over(result) else None)
     )
 

@@ -29,6 +29,7 @@ WRITTEN_OVER = "the arrays that were given hold other samples by now"
 FED_BACK = "the torque holds the angle's noise"
 UNTOLD_LAG = "the record does not tell half a sample of lag"
 NOT_CONSTANT = " was given as constant, but parts of the record differ"
+UNFOLLOWED = " differs between parts of the record, and nothing that follows it explains that"
 CONDITIONS = (FED_BACK, UNTOLD_LAG, NOT_CONSTANT)
 """What advice says on which errors depend."""
 

@@ -77,6 +77,9 @@ mod _core {
     /// Probability below which parts of a record differ by more than chance.
     #[pymodule_export]
     const NO_CHANCE: f64 = tvident::inference::NO_CHANCE;
+    /// The part of a constant by which parts of a record must differ to contradict that it was left constant.
+    #[pymodule_export]
+    const HARDLY_DIFFERS: f64 = tvident::inference::HARDLY_DIFFERS;
     /// A term is suspected if its coefficient exceeds its standard error so many times.
     #[pymodule_export]
     const CONSPICUOUS: f64 = tvident::inference::CONSPICUOUS;

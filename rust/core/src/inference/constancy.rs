@@ -49,6 +49,10 @@ pub const NO_CHANCE: f64 = 5e-4;
 /// The same for a line beside what blocks say: both together find what is not there hardly more often than blocks alone.
 const NO_CHANCE_OF_A_LINE: f64 = 0.1 * NO_CHANCE;
 
+/// The part of a constant that was to vary if it does by which parts of a record must differ to contradict it: next to no noise shows less, which curves
+/// beside it leave.
+pub const HARDLY_DIFFERS: f64 = 0.01;
+
 /// The result of the test of one constant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Test {

@@ -4,17 +4,16 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::exec::stages::Stages;
+use crate::inference::largest_square::{LargestSquare, MOST};
 use crate::inference::moving::moving;
 use crate::regression::block_sums::BlockSums;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
+use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::predictor::{Predictor, without_constants};
 use crate::regression::problem::Problem;
 use crate::regression::window_length::Scale;
 use crate::simd::instructions::Instructions;
-
-/// Squared errors over the noise variance are clipped to this, so that single rows do not dominate.
-const MOST: f64 = 9.0;
 
 /// So many of the longest windows that some rows hold are tried again on all rows, where one of them is best.
 pub(crate) const OVERLAP: usize = 2;
@@ -22,6 +21,11 @@ pub(crate) const OVERLAP: usize = 2;
 /// Parts of the rows that must compare a length with the best, and standard errors beyond which it predicts worse.
 const FEWEST_PARTS: usize = 6;
 const WORSE: f64 = 3.0;
+
+/// The part more than the best windows that longer ones may leave where noise explains neither, and the error from which on it is so large: beyond what
+/// fails it grows from nothing, for what few rows leave more is no reason for long windows.
+const TOLERATED: f64 = 0.25;
+const FAR_BEYOND: f64 = 1.5 * NOISE_MODEL_FAILS;
 
 /// Parts of the rows that tell by how much the errors of two lengths differ by chance, and standard errors up to which one predicts as well.
 const PARTS: usize = 16;
@@ -58,12 +62,12 @@ impl Validated {
 /// Lengths whose constants are not determined are left out.
 pub(crate) fn validate(
     problem: &Problem<'_>,
-    scales: &[Scale],
+    (scales, largest): (&[Scale], LargestSquare),
     expected: Expected,
     instructions: Instructions,
     stages: &mut Stages<'_, '_>,
 ) -> Result<Vec<Validated>, Error> {
-    let compared = ComparedRows::new(problem, scales);
+    let compared = ComparedRows::new(problem, scales, largest);
     let sums = BlockSums::new(problem, scales.iter().map(|scale| scale.step), instructions, stages)?;
     let mut validated = Vec::new();
     for some in Scale::together(scales, problem.rows()) {
@@ -80,16 +84,17 @@ pub(crate) fn validate(
 pub(crate) struct ComparedRows {
     rows: Range<usize>,
     moving: Vec<bool>,
+    largest: LargestSquare,
 }
 
 impl ComparedRows {
-    pub(crate) fn new(problem: &Problem<'_>, scales: &[Scale]) -> Self {
+    pub(crate) fn new(problem: &Problem<'_>, scales: &[Scale], largest: LargestSquare) -> Self {
         let (rows, inside) = (problem.rows(), problem.inside());
         let full = || scales.iter().map(|scale| scale.full_rows(rows));
         let start = full().map(|rows| rows.start).max().unwrap_or(0).min(inside.start + inside.len() / 4);
         let end = full().map(|rows| rows.end).min().unwrap_or(rows).max(inside.start + 3 * inside.len() / 4);
         let reach = scales.first().map_or(1, |scale| scale.reach);
-        Self { rows: start..end, moving: moving(problem, reach) }
+        Self { rows: start..end, moving: moving(problem, reach), largest }
     }
 
     /// Mean squared error, over the noise's variance, of predicting rows from the windows on both sides of them: of all, or of those that move, if it is
@@ -104,12 +109,16 @@ impl ComparedRows {
         self.errors_of(squared)
     }
 
-    /// The same of what predictions of rows leave, squared, over the variance of the noise, and clipped.
+    /// The same of what predictions of rows leave, squared, over the variance of the noise.
     pub(crate) fn errors_of(&self, squared: impl Fn(usize) -> Option<f64>) -> (f64, Vec<f64>) {
         let [mut all, mut moving] = [(0.0, 0.0_f64); 2];
         let mut parts = [(0.0, 0.0); PARTS];
         let length = self.rows.len().div_ceil(PARTS).max(1);
-        for (row, squared) in self.rows.clone().filter_map(|row| Some((row, squared(row)?))) {
+        let squares: Vec<f64> = self.rows.clone().map(|row| squared(row).unwrap_or(f64::NAN)).collect();
+        let of_moving = self.rows.clone().zip(&squares).filter(|(row, _)| self.moving[*row]).map(|(_, square)| *square);
+        let most = self.largest.of(of_moving, MOST);
+        for (row, square) in self.rows.clone().zip(squares).filter(|(_, square)| !square.is_nan()) {
+            let squared = square.min(most);
             all = (all.0 + squared, all.1 + 1.0);
             if self.moving[row] {
                 moving = (moving.0 + squared, moving.1 + 1.0);
@@ -136,7 +145,7 @@ pub(crate) fn rule_out(
     instructions: Instructions,
     stages: &mut Stages<'_, '_>,
 ) -> Result<(Vec<Scale>, RuledOut), Error> {
-    let found = validate(few, &scales[..held], expected, instructions, stages)?;
+    let found = validate(few, (&scales[..held], LargestSquare::Growing), expected, instructions, stages)?;
     let stays = not_ruled_out(few, &found, parts, expected.variance);
     let out = found.iter().zip(stays).filter(|(_, stays)| !stays);
     let out: RuledOut = out.filter_map(|(one, _)| Some((one.fit.scale?, one.error))).collect();
@@ -146,8 +155,8 @@ pub(crate) fn rule_out(
     Ok((left.iter().copied().filter(|scale| !is_out(scale)).collect(), out))
 }
 
-/// The best of the lengths that are left, and its error on the rows that all lengths are compared on. Fits of short windows are as large as the record:
-/// none is kept.
+/// The best of the lengths that are left, and its error on the rows that all lengths are compared on; the longest that are as good where that is far more
+/// than noise explains. Fits of short windows are as large as the record: none is kept.
 pub(crate) fn best_length(
     problem: &Problem<'_>,
     (scales, left): (&[Scale], &[Scale]),
@@ -155,19 +164,18 @@ pub(crate) fn best_length(
     instructions: Instructions,
     stages: &mut Stages<'_, '_>,
 ) -> Result<Option<(Scale, f64)>, Error> {
-    let compared = ComparedRows::new(problem, scales);
+    let compared = ComparedRows::new(problem, scales, LargestSquare::Growing);
     let sums = BlockSums::new(problem, left.iter().map(|scale| scale.step), instructions, stages)?;
-    let mut best: Option<(Scale, f64)> = None;
+    let mut found: Vec<(Scale, f64)> = Vec::new();
     for some in Scale::together(left, problem.rows()) {
         let fits = Fit::of_lengths((problem, sums.as_ref()), some, expected, instructions, stages)?;
         for (&scale, fit) in some.iter().zip(fits).filter_map(|(scale, fit)| Some((scale, fit?))) {
-            let error = compared.error(problem, scale, &fit, expected.variance);
-            if best.is_none_or(|(_, least)| error.total_cmp(&least).is_lt()) {
-                best = Some((scale, error));
-            }
+            found.push((scale, compared.error(problem, scale, &fit, expected.variance)));
         }
     }
-    Ok(best)
+    let best = found.iter().min_by(|a, b| a.1.total_cmp(&b.1));
+    let Some(&best) = best else { return Ok(None) };
+    Ok(found.into_iter().filter(|(_, error)| is_as_good(*error, best.1)).max_by_key(|(scale, _)| scale.span()))
 }
 
 /// So many lengths on either side of the one that was best before are tried first.
@@ -186,6 +194,18 @@ pub(crate) fn is_inside(best: usize, near: &Range<usize>, count: usize) -> bool 
 /// The fit with the smallest error, or `None` if none predicts any row.
 pub(crate) fn best(validated: &[Validated]) -> Option<&Validated> {
     validated.iter().filter(|one| one.error.is_finite()).min_by(|a, b| a.error.total_cmp(&b.error))
+}
+
+/// The fit with the smallest error, or where that is far more than noise explains the one in the longest windows that are as good.
+pub(crate) fn longest_as_good(validated: &[Validated]) -> Option<&Validated> {
+    let best = best(validated)?;
+    validated.iter().filter(|one| is_as_good(one.error, best.error)).max_by_key(|one| one.fit.span)
+}
+
+/// Whether windows leave hardly more than the best do. Where that is far more than noise explains they follow what is missing, and the shorter the more.
+fn is_as_good(error: f64, best: f64) -> bool {
+    let beyond = (best - NOISE_MODEL_FAILS) / (FAR_BEYOND - NOISE_MODEL_FAILS);
+    error <= best * (1.0 + TOLERATED * beyond.clamp(0.0, 1.0))
 }
 
 /// The longest windows that predict as well as the best, where some constant is known far better with them. Along a sweep hardly a frequency passes
@@ -215,13 +235,16 @@ fn not_ruled_out(problem: &Problem<'_>, validated: &[Validated], parts: &[Range<
             (0..problem.rows()).map(of).collect()
         })
         .collect();
-    let place = best(validated).and_then(|best| validated.iter().position(|one| std::ptr::eq(one, best)));
+    let place = longest_as_good(validated).and_then(|best| validated.iter().position(|one| std::ptr::eq(one, best)));
     let Some(best) = place.map(|place| &squares[place]) else { return vec![true; validated.len()] };
+    let most = LargestSquare::Growing.of(best.iter().copied(), MOST);
     let is_worse = |squares: &Vec<f64>| {
         let differences: Vec<f64> = parts
             .iter()
             .filter_map(|part| {
-                let differences = part.clone().map(|row| squares[row] - best[row]).filter(|one| one.is_finite());
+                let both =
+                    part.clone().map(|row| (squares[row], best[row])).filter(|(one, best)| !(one - best).is_nan());
+                let differences = both.map(|(one, best)| one.min(most) - best.min(most));
                 let (sum, count) = differences.fold((0.0, 0.0), |(sum, count), one| (sum + one, count + 1.0));
                 (count > 0.0).then(|| sum / count)
             })
@@ -233,7 +256,7 @@ fn not_ruled_out(problem: &Problem<'_>, validated: &[Validated], parts: &[Range<
     squares.iter().map(|squares| !is_worse(squares)).collect()
 }
 
-/// The squared error of predicting a row from the windows on both sides of it, over the noise's variance and clipped.
+/// The squared error of predicting a row from the windows on both sides of it, over the noise's variance.
 fn squared_errors<'a>(
     problem: &'a Problem<'_>,
     scale: Scale,
@@ -241,12 +264,7 @@ fn squared_errors<'a>(
     variance: f64,
 ) -> Option<impl Fn(usize) -> Option<f64> + 'a> {
     let left = left_of_rows(problem, scale, fit)?;
-    Some(move |row: usize| left(row).filter(|_| problem.usable[row]).map(|left| clipped(left, variance)))
-}
-
-/// What is left of a row, squared, over the variance of the noise, and clipped.
-pub(crate) fn clipped(left: f64, variance: f64) -> f64 {
-    (left * left / variance).min(MOST)
+    Some(move |row: usize| left(row).filter(|_| problem.usable[row]).map(|left| left * left / variance))
 }
 
 /// What predictions from the windows on both sides of a row leave of it; `None` if there are no such windows.
@@ -280,7 +298,7 @@ mod tests {
         rows.exclude(excluded.iter().copied());
         let problem = model().problem(&rows, &rows.rhs, 0.0, None);
         let (scales, expected) = (Scale::all(ROWS, 3), white(DEVIATION * DEVIATION));
-        staged(|stages| validate(&problem, &scales, expected, Instructions::Scalar, stages))
+        staged(|stages| validate(&problem, (&scales, LargestSquare::Growing), expected, Instructions::Scalar, stages))
     }
 
     #[test]
@@ -319,7 +337,7 @@ mod tests {
         }
         let problem = model().problem(&rows, &rows.rhs, 0.0, None);
         let (scales, expected) = (Scale::all(ROWS, 3), white(DEVIATION * DEVIATION));
-        staged(|stages| validate(&problem, &scales, expected, Instructions::Scalar, stages))
+        staged(|stages| validate(&problem, (&scales, LargestSquare::Growing), expected, Instructions::Scalar, stages))
     }
 
     #[test]
@@ -350,7 +368,9 @@ mod tests {
         let mut stays = |excluded: Range<usize>| {
             rows.exclude(excluded);
             let problem = model().problem(&rows, &rows.rhs, 0.0, None);
-            let found = staged(|stages| validate(&problem, scales, expected, Instructions::Scalar, stages));
+            let found = staged(|stages| {
+                validate(&problem, (scales, LargestSquare::Growing), expected, Instructions::Scalar, stages)
+            });
             not_ruled_out(&problem, &found, &parts, expected.variance)
         };
         let all = stays(0..0);
@@ -380,7 +400,7 @@ mod tests {
         let held = scale.span() + 1;
         let error = |moving: Range<usize>| {
             let moving = (0..ROWS).map(|row| moving.contains(&row)).collect();
-            ComparedRows { rows: 600..800, moving }.error(&problem, scale, &fit, 1.0)
+            ComparedRows { rows: 600..800, moving, largest: LargestSquare::Growing }.error(&problem, scale, &fit, 1.0)
         };
         let found = error(0..ROWS);
         assert!(found >= MOST / 200.0 && found <= MOST * held as f64 / 200.0, "{found}");

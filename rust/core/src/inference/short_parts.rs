@@ -24,6 +24,11 @@ pub(crate) const MORE_THAN_NOISE: f64 = 1.2;
 /// .35 where a friction or a drag is missing.
 pub(crate) const LEFT_OF_SWINGS: f64 = 0.2;
 
+/// The part of what noise does not explain that may be left where rows are predicted so badly that hardly one is within the noise: what swings leaves at
+/// most .035. Where an angle is low-passed, a torque late, or a friction, a drag or a cubic spring missing, .06 and more is left beside curves of one or two
+/// constants that are positive, and mostly half.
+pub(crate) const LEFT_WHERE_LOST: f64 = 0.04;
+
 /// The length of a part, in windows.
 const WINDOWS: usize = 2;
 

@@ -1,5 +1,6 @@
 //! How well slow coefficients predict rows: from equations without the row, beside windows on both sides of it.
 
+use crate::inference::largest_square::{LargestSquare, USUAL};
 use crate::inference::slow_curve::Varying;
 use crate::inference::slow_equations::Slow;
 use crate::regression::constants::Expected;
@@ -8,8 +9,17 @@ use crate::regression::solved::is_determined;
 use crate::regression::subsample::rows_all_over;
 use crate::regression::window_length::Scale;
 
-/// Squared errors over the noise variance are clipped to this, so that single rows do not dominate.
+/// The largest squared error over the noise's variance that counts, where noise explains the usual one.
 const MOST: f64 = 25.0;
+
+/// Which curves of a bandwidth are to predict a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PredictedBy {
+    /// Those without the equations near it.
+    OtherEquations,
+    /// Those with all equations, where what is left is far more than noise.
+    AllEquations,
+}
 
 /// How well slow coefficients predict rows.
 #[derive(Clone, Copy, Debug)]
@@ -69,34 +79,26 @@ impl<'a, 'b> PredictedRows<'a, 'b> {
     /// Mean squared error of predicting them, over the noise's variance: slow coefficients from equations without the row, windowed ones from windows
     /// on both sides of it. The angle's noise in a row grows with the coefficients: each square counts as if that were the expected noise, or
     /// the smallest coefficients would predict best. More than twice that noise excuses no error.
-    pub(crate) fn error(&self, leave_gap_out: &Varying, full: &Varying, expected: Expected) -> Prediction {
+    ///
+    /// Where what is left is far more than noise, it may be that curves without the equations near a row cannot follow what moves quickly: if they are to be,
+    /// those with all of them are compared there, and all of these are worse than what predicts with noise alone.
+    pub(crate) fn error(
+        &self,
+        [leave_gap_out, full]: &[Varying; 2],
+        compared: Option<PredictedBy>,
+        expected: Expected,
+    ) -> Prediction {
         let &Self { problem, slow, .. } = self;
-        let (coefficients, layout) = (slow.coefficients, problem.layout);
+        let coefficients = slow.coefficients;
         let is_noisy = !problem.noise.is_zero();
         let usual = expected.variance - expected.torque;
-        let (mut sum, mut excess) = (0.0, 0.0);
+        let (mut squares, mut excess) = (Vec::with_capacity(self.rows.len()), 0.0);
         let mut factors = Vec::new();
-        let mut locals = vec![0.0; layout.local()];
-        let mut constants = [leave_gap_out, full].map(|curve| {
-            let mut constants = vec![0.0; layout.constant];
-            constants[coefficients..].copy_from_slice(&curve.constants);
-            constants
-        });
+        let mut locals = vec![0.0; problem.layout.local()];
+        let mut constants = [leave_gap_out, full].map(|curve| self.constants(curve));
         for (beside, taken) in self.rows.iter().zip(self.taken.chunks(coefficients)) {
-            let row = beside.row;
-            let mut error = problem.rhs[row];
-            for (one, (companion, (value, rate))) in slow.companions.iter().zip(taken).enumerate() {
-                let (of_all, slope) = full.at(one, row as f64);
-                constants[0][one] = leave_gap_out.at(one, row as f64).0 - value;
-                constants[1][one] = of_all - value;
-                error -= (slope - rate) / problem.period * companion[row];
-            }
-            for (constant, column) in constants[0].iter().zip(&problem.constants) {
-                error -= constant * column[row];
-            }
-            self.locals(beside.place, &constants[0], &mut locals);
-            error -= beside.predicted(problem, &locals);
-            let mut square = error * error;
+            let left = self.left((beside, taken), (leave_gap_out, full), &mut constants[0], &mut locals);
+            let mut square = left * left;
             if is_noisy {
                 let mut more = |constants: &[f64], locals: &[f64]| {
                     beside.factors(problem, locals, &mut factors);
@@ -106,17 +108,62 @@ impl<'a, 'b> PredictedRows<'a, 'b> {
                     (problem.noise.variance(&factors) - usual).min(usual)
                 };
                 square -= more(&constants[0], &locals);
+                for (one, (value, _)) in taken.iter().enumerate() {
+                    constants[1][one] = full.at(one, beside.row as f64).0 - value;
+                }
                 self.locals(beside.place, &constants[1], &mut locals);
                 excess += more(&constants[1], &locals) / expected.variance;
             }
-            sum += (square / expected.variance).min(MOST);
+            squares.push(square / expected.variance);
         }
         let count = self.rows.len() as f64;
-        if count > 0.0 {
-            Prediction { error: sum / count, excess: excess / count }
-        } else {
-            Prediction { error: f64::INFINITY, excess: 0.0 }
+        if count == 0.0 {
+            return Prediction { error: f64::INFINITY, excess: 0.0 };
         }
+        let mean = |squares: &[f64]| {
+            let most = LargestSquare::Growing.of(squares.iter().copied(), MOST);
+            squares.iter().map(|square| square.min(most)).sum::<f64>() / count
+        };
+        let error = mean(&squares);
+        let is_lost = error > USUAL && compared == Some(PredictedBy::AllEquations);
+        if is_lost {
+            squares.clear();
+            for of_row in self.rows.iter().zip(self.taken.chunks(coefficients)) {
+                let left = self.left(of_row, (full, full), &mut constants[1], &mut locals);
+                squares.push(left * left / expected.variance);
+            }
+        }
+        Prediction { error: if is_lost { USUAL + mean(&squares) } else { error }, excess: excess / count }
+    }
+
+    /// The constants beside a curve, after places for its coefficients at a row.
+    fn constants(&self, curve: &Varying) -> Vec<f64> {
+        let mut constants = vec![0.0; self.problem.layout.constant];
+        constants[self.slow.coefficients..].copy_from_slice(&curve.constants);
+        constants
+    }
+
+    /// What is left of a row, from which slow coefficients and their growth were taken before, with those of a curve, the growth of another, and windows on
+    /// both sides of it, whose unknowns it gives, too.
+    fn left(
+        &self,
+        (beside, taken): (&PredictedRow, &[(f64, f64)]),
+        (curve, growth): (&Varying, &Varying),
+        constants: &mut [f64],
+        locals: &mut [f64],
+    ) -> f64 {
+        let &Self { problem, slow, .. } = self;
+        let row = beside.row;
+        let mut left = problem.rhs[row];
+        for (one, (companion, (value, rate))) in slow.companions.iter().zip(taken).enumerate() {
+            constants[one] = curve.at(one, row as f64).0 - value;
+            left -= (growth.at(one, row as f64).1 - rate) / problem.period * companion[row];
+        }
+        for (constant, column) in constants.iter().zip(&problem.constants) {
+            left -= constant * column[row];
+        }
+        self.locals(beside.place, constants, locals);
+        left - beside.predicted(problem, locals)
     }
 
     /// The unknowns of windows for given constants: values at the middle, then their growth.
@@ -195,7 +242,8 @@ mod tests {
         let weights = vec![1.0; fit.full.len()];
         let companions = vec![rows.regressors[1].companion.as_slice()];
         let slow = Slow { fit: &fit, coefficients: 1, companions, current, weights: &weights, rows: ROWS, breaks: &[] };
-        PredictedRows::new(&slow, &problem, scale).error(curves[0], curves[1], expected)
+        let curves = curves.map(Varying::clone);
+        PredictedRows::new(&slow, &problem, scale).error(&curves, Some(PredictedBy::OtherEquations), expected)
     }
 
     #[test]

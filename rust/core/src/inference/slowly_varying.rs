@@ -5,25 +5,24 @@
 //! fall with the distance. The bandwidth is chosen by cross-validation: a point's own neighbourhood is left out to
 //! predict its rows.
 
-use std::borrow::Cow;
-use std::ops::Range;
-
 use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::exec::stages::Stages;
-use crate::inference::bandwidths::{outward, within};
+use crate::inference::bandwidths::within;
 use crate::inference::constancy::BLOCKS;
-use crate::inference::cross_validation::{ComparedRows, best_length, is_inside, near, rule_out};
+use crate::inference::cross_validation::ComparedRows;
+use crate::inference::largest_square::LargestSquare;
+use crate::inference::short_parts::LEFT_WHERE_LOST;
+use crate::inference::slow_bandwidths::{BestCurve, hole};
 use crate::inference::slow_curve::Varying;
-use crate::inference::slow_equations::{QUADRATIC, Slow};
-use crate::inference::slow_predictions::{PredictedRows, Prediction};
+use crate::inference::slow_equations::Slow;
+use crate::inference::slow_lengths::{FewRows, SlowSearch};
+use crate::inference::slow_predictions::PredictedBy;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
+use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
-use crate::regression::problem::Problem;
-use crate::regression::subsample::{few_stretches, places_of, thinned_column, thinned_rows};
 use crate::regression::window_length::Scale;
-use crate::simd::instructions::Instructions;
 
 /// The part of the record, or of its shortest stretch between jumps, that windows span at most: one whose parts are told to differ is followed
 /// from part to part.
@@ -31,6 +30,15 @@ pub(crate) const STRETCH: usize = BLOCKS;
 
 /// Rounds of estimating the slow coefficients, each starting from the last one's result.
 const ROUNDS: usize = 3;
+/// So many where rows are predicted badly and each round leaves no more than a part of what the one before did.
+const MOST_ROUNDS: usize = 9;
+const FALLING: f64 = 0.7;
+/// The part of the error of predicting rows that may be left where hardly a row is within the noise for a constant to change: without the equations near a
+/// row curves leave .02 to .25 of it where it does, with a friction or a drag missing as well, .35 and more where a friction is followed as if a damping
+/// changed, and .9 where an angle was low-passed or a torque is late.
+pub(crate) const EXPLAINED: f64 = 0.3;
+/// The part of what those curves leave that curves with all equations may leave.
+const FAR_LESS: f64 = 0.5;
 /// A round is the last that chooses the same and changes the error by no more than this part.
 const SETTLED: f64 = 2e-3;
 
@@ -56,127 +64,37 @@ pub(crate) struct SlowCoefficients {
     terms: usize,
 }
 
-/// The data in which slow coefficients are estimated.
-pub(crate) struct SlowSearch<'a> {
-    pub(crate) rows: &'a Rows,
-    /// The slow coefficients come first among its constants.
-    pub(crate) model: &'a Model,
-    pub(crate) coefficients: usize,
-    /// Variance of the angle's noise.
-    pub(crate) noise: f64,
-    pub(crate) expected: Expected,
-    /// Lengths of windows for the windowed coefficients.
-    pub(crate) scales: &'a [Scale],
-    /// Rows that windows span at most, if that is known.
-    pub(crate) longest: Option<usize>,
-    /// The error from which on a round is the last: what is only tried is worth no more.
-    pub(crate) hopeless: f64,
-    /// The first rows after places where they may jump.
-    pub(crate) breaks: &'a [usize],
-    /// What errors of constants between jumps are multiplied by, in comparison with those of curves.
-    pub(crate) simpler: f64,
-    pub(crate) instructions: Instructions,
-}
-
-/// The curves of one bandwidth, without equations near each row and with all, and what noise is more with them than expected.
-struct BestCurve {
-    terms: usize,
-    curves: [Varying; 2],
-    reach: f64,
-    excess: f64,
-}
-
-/// Few of many rows, and how many of the shortest lengths of windows they hold.
-struct FewRows {
-    rows: Rows,
-    stretches: Vec<Range<usize>>,
-    held: usize,
-}
-
-impl FewRows {
-    fn of(rows: &Rows, scales: &[Scale]) -> Option<Self> {
-        let (stretches, held) = few_stretches(rows.len(), scales)?;
-        Some(Self { rows: thinned_rows(rows, &stretches), stretches, held })
-    }
-}
-
-impl SlowSearch<'_> {
-    /// The length of windows that predicts best what slow coefficients leave, and its error. Lengths near the best one of the round before are tried
-    /// first, and a few rows rule out most of all.
-    fn best_length(
-        &self,
-        problem: &Problem<'_>,
-        (rest, before): (&Model, Option<Scale>),
-        few: &mut Option<FewRows>,
-        stages: &mut Stages<'_, '_>,
-    ) -> Result<Option<(Scale, f64)>, Error> {
-        let &Self { noise, expected, scales, instructions, .. } = self;
-        let place_of = |scale: Scale| scales.iter().position(|one| *one == scale);
-        if let Some(place) = before.and_then(place_of) {
-            let near = near(place, scales.len());
-            let found = best_length(problem, (scales, &scales[near.clone()]), expected, instructions, stages)?;
-            let best = found.and_then(|(best, _)| place_of(best));
-            if best.is_some_and(|best| is_inside(best, &near, scales.len())) {
-                return Ok(found);
-            }
-        }
-        let left = match few {
-            Some(FewRows { rows, stretches, held }) => {
-                rows.rhs = thinned_column(problem.rhs, stretches);
-                let few = rest.problem(rows, &rows.rhs, noise, None);
-                Cow::Owned(rule_out(&few, &places_of(stretches), (scales, *held), expected, instructions, stages)?.0)
-            }
-            None => Cow::Borrowed(scales),
-        };
-        best_length(problem, (scales, &left), expected, instructions, stages)
-    }
-
-    /// The curves of the bandwidth that predicts best, or the first one where nothing is compared.
-    fn best_curve(
-        &self,
-        equations: &Slow<'_>,
-        problem: &Problem<'_>,
-        (scale, compares): (Scale, bool),
-        (reaches, last): (&[f64], Option<f64>),
-        stages: &mut Stages<'_, '_>,
-    ) -> Result<Option<BestCurve>, Error> {
-        let &Self { expected, simpler, instructions, .. } = self;
-        let triangles = equations.equations(problem);
-        let rows = PredictedRows::new(equations, problem, scale);
-        let mut best: Option<BestCurve> = None;
-        let mut least = f64::INFINITY;
-        let mut consider = |terms: usize, reach: f64| -> Result<bool, Error> {
-            if best.is_some() && !compares {
-                return Ok(false);
-            }
-            let fitted = equations.fit(&triangles, terms, (reach, hole(scale)), instructions, stages)?;
-            let Some(curves) = fitted else { return Ok(false) };
-            let Prediction { error, excess } = rows.error(&curves[0], &curves[1], expected);
-            let counts = if terms == 1 { simpler * error } else { error };
-            let is_better = best.is_none() || counts < least;
-            if is_better {
-                least = counts;
-                best = Some(BestCurve { terms, curves, reach, excess });
-            }
-            Ok(is_better)
-        };
-        outward(reaches, last, |reach| consider(QUADRATIC, reach))?;
-        // Between jumps a coefficient may be constant.
-        if !self.breaks.is_empty() {
-            consider(1, 2.0 * self.rows.len() as f64)?;
-        }
-        Ok(best)
-    }
-}
-
-/// Rows on either side that a prediction leaves out.
-fn hole(scale: Scale) -> f64 {
-    (scale.span() / 2 + scale.reach) as f64
+/// Whether another round is not worth its time after so many, the last of which changed the error of predicting rows.
+fn is_enough(round: usize, (before, error): (Option<f64>, f64)) -> bool {
+    let is_falling = error >= NOISE_MODEL_FAILS && before.is_some_and(|before| error < FALLING * before);
+    round >= if is_falling { MOST_ROUNDS } else { ROUNDS }
 }
 
 /// Estimates slow coefficients, or returns `None` if they are not determined. `first` is the length of windows to begin with.
+///
+/// Where rows are predicted badly it is not known whether the coefficients move so quickly that no curve without the equations near a row can follow them:
+/// curves with all equations are compared, too. They follow half of whatever is missing, so they stand only where they leave far less than others, which show
+/// that something changes, or else next to nothing.
 pub(crate) fn find(
     search: &SlowSearch<'_>,
+    first: Scale,
+    stages: &mut Stages<'_, '_>,
+) -> Result<Option<SlowCoefficients>, Error> {
+    let found = find_by((search, PredictedBy::OtherEquations), first, stages)?;
+    let is_told = found.as_ref().is_some_and(|found| found.error < NOISE_MODEL_FAILS);
+    if is_told || !search.is_lost() {
+        return Ok(found);
+    }
+    let quick = find_by((search, PredictedBy::AllEquations), first, stages)?;
+    let by_others = found.as_ref().map_or(f64::INFINITY, |found| found.error);
+    let is_followed = by_others < EXPLAINED * search.before;
+    let stands = |quick: f64| quick < FAR_LESS * by_others && (is_followed || quick < LEFT_WHERE_LOST * search.before);
+    Ok(quick.filter(|quick| stands(quick.error)).or(found))
+}
+
+/// Estimates them with bandwidths that are compared in one way.
+fn find_by(
+    (search, compared): (&SlowSearch<'_>, PredictedBy),
     first: Scale,
     stages: &mut Stages<'_, '_>,
 ) -> Result<Option<SlowCoefficients>, Error> {
@@ -189,16 +107,12 @@ pub(crate) fn find(
     let stretches = std::iter::once(0).chain(breaks.iter().copied()).zip(ends);
     let shortest = stretches.filter_map(|(start, end)| end.checked_sub(start)).min();
     let mut most = (shortest.unwrap_or(0) / STRETCH).min(search.longest.unwrap_or(usize::MAX));
-    let shortened = |scale: Scale, most: usize| {
-        let short = scales.iter().rev().find(|one| one.span() <= most);
-        if scale.span() <= most { scale } else { short.or(scales.first()).copied().unwrap_or(scale) }
-    };
-    let mut scale = shortened(first, most);
+    let mut scale = search.next_length(first, most, model.layout());
     let mut found: Option<SlowCoefficients> = None;
     let mut last: Option<f64> = None;
     let mut few = FewRows::of(rows, scales);
-    for round in 1..=ROUNDS {
-        let current = found.as_ref().map(|found| &found.varying);
+    for round in 1.. {
+        let (current, before) = (found.as_ref().map(|found| &found.varying), found.as_ref().map(|found| found.error));
         let rhs = found.as_ref().map_or_else(|| rows.rhs.clone(), |found| found.rhs.clone());
         let taken = found.as_ref().map_or_else(Vec::new, |found| found.taken.clone());
         let model = Model { taken, ..model.clone() };
@@ -216,7 +130,8 @@ pub(crate) fn find(
         let companions = slow.iter().map(|&one| rows.regressors[one].companion.as_slice()).collect();
         let equations = Slow { fit: &fit, coefficients, companions, current, weights, rows: rows.len(), breaks };
         let reaches = within(hole(scale), whole);
-        let best = search.best_curve(&equations, &problem, (scale, compares), (&reaches, last), stages)?;
+        let best =
+            search.best_curve(&equations, &problem, (scale, compares.then_some(compared)), (&reaches, last), stages)?;
         let Some(BestCurve { terms, curves: [leave_gap_out, varying], reach, excess }) = best else { return Ok(None) };
         let reach = reach.min(whole / 2.0);
         last = (terms > 1).then_some(reach);
@@ -228,23 +143,26 @@ pub(crate) fn find(
         let taken = varying.levels(slow);
         let rest = Model { taken: taken.clone(), ..rest.clone() };
         let problem = rest.problem(rows, &rhs, noise, None);
-        let before = found.as_ref().map(|found| found.scale);
-        let best = search.best_length(&problem, (&rest, before), &mut few, stages)?;
+        let scale_before = found.as_ref().map(|found| found.scale);
+        let best = search.best_length(&problem, (&rest, scale_before), &mut few, stages)?;
         let Some((best, error)) = best else { return Ok(None) };
         let error = error - excess;
         let is_settled = found.as_ref().is_some_and(|found| {
             let chosen = (found.scale, found.equations_of, found.reach, found.terms);
             chosen == (best, scale, reach, terms) && (error - found.error).abs() <= SETTLED * error
         });
-        let is_last = round == ROUNDS || is_settled || error > search.hopeless;
+        if before.is_some_and(|before| error >= NOISE_MODEL_FAILS && error > before) {
+            // Rounds that leave more and more come to nothing.
+            break;
+        }
+        let is_last = is_settled || error > search.hopeless || is_enough(round, (before, error));
         let mut predicted = error;
-        if is_last && !rows.jumps.is_empty() {
+        if (is_last || search.is_lost()) && !rows.jumps.is_empty() {
             let rhs = without(rows, &rows.rhs, slow, &leave_gap_out);
             let problem = rest.problem(rows, &rhs, noise, None);
             let fit = Fit::with_leave_gap_out(&problem, best, expected, instructions, stages)?;
-            let compared = ComparedRows::new(&problem, scales);
-            predicted =
-                fit.map_or(f64::INFINITY, |fit| compared.error(&problem, best, &fit, expected.variance)) - excess;
+            let rows = ComparedRows::new(&problem, scales, LargestSquare::Growing);
+            predicted = fit.map_or(f64::INFINITY, |fit| rows.error(&problem, best, &fit, expected.variance)) - excess;
         }
         found = Some(SlowCoefficients {
             varying,
@@ -260,7 +178,7 @@ pub(crate) fn find(
         if is_last {
             break;
         }
-        scale = shortened(best, most);
+        scale = search.next_length(best, most, model.layout());
     }
     Ok(found)
 }
@@ -306,20 +224,30 @@ pub(crate) fn without(rows: &Rows, rhs: &[f64], slow: &[usize], varying: &Varyin
 mod tests {
     use super::*;
     use crate::regression::simulated::{CONSTANTS, PERIOD, model, rows, staged, white};
+    use crate::simd::instructions::Instructions;
 
     const ROWS: usize = 1200;
     const DEVIATION: f64 = 0.1;
 
     /// The first constant over time, by row, and its rate per second.
     fn slow(row: f64) -> [f64; 2] {
-        let pace = 2.0 * std::f64::consts::PI / ROWS as f64;
+        swinging(1.0, row)
+    }
+
+    /// The same with so many cycles in the record.
+    fn swinging(cycles: f64, row: f64) -> [f64; 2] {
+        let pace = 2.0 * std::f64::consts::PI * cycles / ROWS as f64;
         [CONSTANTS[0] + 0.5 * (pace * row).sin(), 0.5 * pace / PERIOD * (pace * row).cos()]
     }
 
     fn changing() -> Rows {
-        let mut rows = rows(ROWS, |time| [(0.05 * time).sin(), 0.05 * (0.05 * time).cos()], DEVIATION);
+        changing_by(1.0, DEVIATION)
+    }
+
+    fn changing_by(cycles: f64, deviation: f64) -> Rows {
+        let mut rows = rows(ROWS, |time| [(0.05 * time).sin(), 0.05 * (0.05 * time).cos()], deviation);
         for row in 0..ROWS {
-            let ([value, rate], regressor) = (slow(row as f64), &rows.regressors[1]);
+            let ([value, rate], regressor) = (swinging(cycles, row as f64), &rows.regressors[1]);
             rows.rhs[row] += (value - CONSTANTS[0]) * regressor.value[row] + rate * regressor.companion[row];
         }
         rows
@@ -334,6 +262,7 @@ mod tests {
             expected: white(DEVIATION * DEVIATION),
             scales,
             longest: None,
+            before: 1.0,
             hopeless: f64::INFINITY,
             breaks: &[],
             simpler: 1.0,
@@ -378,6 +307,36 @@ mod tests {
         // What is better than hopeless takes as many as ever.
         assert_eq!(found(2.0).error.to_bits(), all.error.to_bits());
         assert_ne!(first.error.to_bits(), all.error.to_bits());
+    }
+
+    #[test]
+    fn curves_with_all_equations_stand_only_where_they_leave_next_to_nothing_of_what_constants_do() {
+        let (scales, model) = (Scale::all(ROWS, 3), model());
+        let found = |cycles: f64, before: f64| {
+            let (rows, expected) = (changing_by(cycles, 1e-2), white(1e-4));
+            let search = SlowSearch { expected, before, ..search(&rows, &model, &scales) };
+            staged(|stages| find(&search, scales[2], stages)).expect("a curve")
+        };
+        // Of what changes within windows others leave nearly all.
+        let [quick, half, other] = [1e4, 100.0, 1.0].map(|before| found(40.0, before));
+        assert_eq!(half.error.to_bits(), other.error.to_bits());
+        assert!(
+            quick.error < LEFT_WHERE_LOST * other.error && quick.reach < other.reach,
+            "{} {}",
+            quick.error,
+            other.error
+        );
+        // What others follow is told by them.
+        assert_eq!(found(3.0, 1e4).error.to_bits(), found(3.0, 1.0).error.to_bits());
+    }
+
+    #[test]
+    fn more_rounds_are_worth_it_only_where_rows_are_predicted_badly_and_each_leaves_far_less() {
+        for (before, error, enough) in
+            [(None, 1e3, 3), (Some(1.2), 1.0, 3), (Some(1e3), 800.0, 3), (Some(1e3), 500.0, 9)]
+        {
+            assert_eq!((1..20).find(|&round| is_enough(round, (before, error))), Some(enough), "{before:?} {error}");
+        }
     }
 
     #[test]

@@ -5,7 +5,8 @@ use crate::identify::merged::decided::MergedFit;
 use crate::identify::merged::followed::FOLLOWS;
 use crate::identify::merged::session::MergedSession;
 use crate::inference::across_trials::{Dealt, ROWS_OF_UNKNOWN, SaidAcross, left_across};
-use crate::inference::cross_validation::{ComparedRows, clipped, left_of_rows};
+use crate::inference::cross_validation::{ComparedRows, left_of_rows};
+use crate::inference::largest_square::LargestSquare;
 use crate::inference::window_averaging::Averages;
 use crate::regression::block_products::dot;
 use crate::regression::fit::Fit;
@@ -133,7 +134,7 @@ impl MergedSession<'_, '_, '_> {
         let (rows, instructions) = (&self.all.rows, self.options.instructions);
         let correlated = model.correlated(rows, &covariance, &mut self.stages)?;
         let problem = model.problem(rows, &rows.rhs, 1.0, Some(&correlated));
-        let compared = ComparedRows::new(&problem, tried);
+        let compared = ComparedRows::new(&problem, tried, LargestSquare::Fixed);
         let fit = Fit::with_leave_gap_out(&problem, of_others, expected, instructions, &mut self.stages)?;
         let Some(of_best) = fit else { return Ok(Vec::new()) };
         let Some(left_of_others) = left_of_rows(&problem, of_others, &of_best) else { return Ok(Vec::new()) };
@@ -154,7 +155,7 @@ impl MergedSession<'_, '_, '_> {
                 Some([left[row], other])
             };
             let error = |which: usize| {
-                compared.errors_of(|row| both(row).map(|both| clipped(both[which], expected.variance))).0
+                compared.errors_of(|row| both(row).map(|both| both[which] * both[which] / expected.variance)).0
             };
             let one = PredictedAcross { scale, error: error(0), of_others: error(1) };
             if one.error.is_finite() && (is_asked || tells(&fit, &of_best)) {

@@ -12,6 +12,7 @@ use crate::identify::weak::shown_noise::MORE;
 use crate::inference::constancy::{self, Test};
 use crate::inference::cross_validation::{Validated, best, validate};
 use crate::inference::jumps::jump::Jump;
+use crate::inference::largest_square::LargestSquare;
 use crate::inference::part_constants::{NoiseFrom, TestNoise};
 use crate::regression::fit::Fit;
 use crate::regression::limits::NOISE_MODEL_FAILS;
@@ -155,7 +156,7 @@ impl MergedSession<'_, '_, '_> {
         let mut validated = |rows: &Rows, scales: &[Scale]| {
             let correlated = model.correlated(rows, &covariance, stages)?;
             let problem = model.problem(rows, &rows.rhs, 1.0, Some(&correlated));
-            validate(&problem, scales, expected, instructions, stages)
+            validate(&problem, (scales, LargestSquare::Fixed), expected, instructions, stages)
         };
         let Some(stretches) = stretches_of_rows(rows.len()).filter(|_| scales.len() > 1) else {
             return validated(rows, scales);

@@ -15,6 +15,7 @@ use crate::inference::missing_terms::JudgedTerm;
 use crate::inference::part_constants::{NoiseFrom, TestNoise};
 use crate::inference::trend::tilted;
 use crate::regression::fit::Fit;
+use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
 use crate::regression::subsample::stretches_of_rows;
 use crate::regression::window_length::Scale;
@@ -170,15 +171,32 @@ impl Session<'_, '_, '_> {
         let changing = self.options.decided.iter().filter(|(_, changes)| *changes).map(|(unknown, _)| *unknown);
         let mut changing = changing.filter(|unknown| !model.windowed.contains(unknown));
         let (mut model, mut is_free) = (Cow::Borrowed(model), false);
+        let mut before: Option<Decided> = None;
         loop {
             if !decided.slow.is_empty() && !std::mem::take(&mut is_free) {
                 if decided.found.is_none() {
                     decided.longest = self.swinging(rows, &decided)?.and_then(|one| one.longest);
                 }
                 self.set_free(rows, &model, &mut decided, f64::INFINITY)?;
+                let is_lost = |before: &Decided| decided.error >= NOISE_MODEL_FAILS.max(before.error);
+                if let Some(before) = before.take().filter(is_lost) {
+                    // A curve beside which rows are lost explains no difference between parts.
+                    decided = before;
+                    break;
+                }
             }
             let worst = self.test(rows, &mut decided)?;
-            let Some(worst) = changing.next().or(worst) else {
+            let asked = changing.next();
+            let is_lost = asked.is_none() && !model.windowed.is_empty() && decided.error >= NOISE_MODEL_FAILS;
+            let may_vary = self.most_slow.is_none_or(|most| decided.slow.len() < most);
+            if worst.is_some() && is_lost && may_vary {
+                is_free = self.set_contradicted_free(rows, &model, &mut decided)?;
+                if is_free {
+                    continue;
+                }
+            }
+            let worst = worst.filter(|_| !(is_lost && may_vary));
+            let Some(worst) = asked.or(worst) else {
                 if self.most_slow == Some(decided.slow.len()) && decided.error >= BADLY {
                     // Nothing more may vary that would predict well.
                     break;
@@ -199,6 +217,7 @@ impl Session<'_, '_, '_> {
                 };
                 (model, decided) = (Cow::Owned(free.model.clone()), free);
             } else {
+                before = asked.is_none().then(|| decided.clone());
                 decided.slow.push(worst);
                 if self.varies_too_much(&decided) {
                     // To find how it varies takes longest of all.
@@ -232,13 +251,23 @@ impl Session<'_, '_, '_> {
         decided.tests.retain(|(one, _)| decided.slow.contains(one));
         let constants = decided.model.constant.iter().zip(results);
         decided.tests.extend(constants.filter_map(|(&one, test)| test.map(|test| (one, test))));
+        let alone = decided.model.windowed.is_empty() && self.options.averaging;
+        let may = fit.scale.is_some() || alone;
+        Ok(self.contradicted(decided).first().copied().filter(|_| may))
+    }
+
+    /// The constants that parts of the record contradict and that may be set free, those first that differ most.
+    pub(crate) fn contradicted(&self, decided: &Decided) -> Vec<usize> {
         let tested = self.undecided();
-        let conspicuous = decided.tests.iter().filter(|(one, test)| {
+        let contradicted = decided.tests.iter().filter(|(one, test)| {
             tested.contains(one) && !decided.slow.contains(one) && test.probability < constancy::NO_CHANCE
         });
-        let worst = conspicuous.min_by(|a, b| a.1.probability.total_cmp(&b.1.probability)).map(|(one, _)| *one);
-        let alone = decided.model.windowed.is_empty() && self.options.averaging;
-        Ok(worst.filter(|_| fit.scale.is_some() || alone))
+        let mut contradicted: Vec<_> = contradicted.collect();
+        contradicted.sort_by(|a, b| {
+            let by_excess = b.1.excess().total_cmp(&a.1.excess());
+            a.1.probability.total_cmp(&b.1.probability).then(by_excess)
+        });
+        contradicted.into_iter().map(|(one, _)| *one).collect()
     }
 
     /// The noise that parts of the record are compared with.
@@ -247,7 +276,7 @@ impl Session<'_, '_, '_> {
         TestNoise {
             expected: decided.expected,
             covariance: &decided.covariance,
-            inflation: decided.error.max(1.0),
+            inflation: decided.inflation(),
             from: if is_raised || self.is_rounding { NoiseFrom::Equations } else { NoiseFrom::Channels },
             equations: 1,
         }
@@ -277,7 +306,7 @@ impl Session<'_, '_, '_> {
             covariance,
             correlated,
             expected: *expected,
-            inflation: decided.error.max(1.0),
+            inflation: decided.inflation(),
             instructions: self.options.instructions,
         };
         let lines: Vec<usize> = (first..first + tested.len()).collect();

@@ -8,6 +8,7 @@ use crate::exec::stages::Stages;
 use crate::identify::weak::angle_zero::spring::SpringColumn;
 use crate::inference::constancy::{NO_CHANCE, Test};
 use crate::inference::jumps::jump::Jump;
+use crate::inference::largest_square::MOST;
 use crate::inference::slowly_varying;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
@@ -86,6 +87,12 @@ impl Decided {
     /// Whether constants seem to vary and windows are the shortest of those that were tried.
     pub(crate) fn follows_anything(&self) -> bool {
         !self.slow.is_empty() && self.has_shortest_windows()
+    }
+
+    /// What tests multiply the variance of the noise by: predictions leave as much, but beyond a limit what is missing from the equation would hide what
+    /// differs.
+    pub(crate) fn inflation(&self) -> f64 {
+        if self.error.is_nan() { 1.0 } else { self.error.clamp(1.0, MOST) }
     }
 
     /// The rows that the fit was made with.

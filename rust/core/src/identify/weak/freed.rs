@@ -11,7 +11,8 @@ use crate::identify::weak::session::Session;
 use crate::inference::constancy::Test;
 use crate::inference::part_constants::TestNoise;
 use crate::inference::short_parts::{MORE_THAN_NOISE, Swinging, swinging};
-use crate::inference::slowly_varying;
+use crate::inference::slow_lengths::SlowSearch;
+use crate::inference::slowly_varying::{self, EXPLAINED};
 use crate::regression::fit::Fit;
 use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
@@ -48,7 +49,8 @@ impl Session<'_, '_, '_> {
         decided.longest = swinging.as_ref().and_then(|one| one.longest);
         if let Some(growing) = growing {
             let free = self.freed(rows, model, decided, (&[growing], f64::INFINITY))?;
-            if free.error < FAR_BETTER * decided.error {
+            let most = if decided.error < NOISE_MODEL_FAILS { FAR_BETTER } else { EXPLAINED };
+            if free.error < most * decided.error {
                 *decided = free;
                 return Ok(true);
             }
@@ -57,6 +59,38 @@ impl Session<'_, '_, '_> {
             Some(swinging) => self.set_swinging_free(rows, model, decided, swinging),
             None => Ok(false),
         }
+    }
+
+    /// Sets constants free that parts of the record contradict where hardly a row is within the noise: there parts differ by whatever is missing from the
+    /// equation, and only a constant that explains most of that changes. The one is set free that leaves least, or all of them together, for two that
+    /// change hide each other. Returns whether one was.
+    pub(crate) fn set_contradicted_free(
+        &mut self,
+        rows: &Rows,
+        model: &Model,
+        decided: &mut Decided,
+    ) -> Result<bool, Error> {
+        let contradicted = self.contradicted(decided);
+        if decided.found.is_none() {
+            decided.longest = self.swinging(rows, decided)?.and_then(|one| one.longest);
+        }
+        let alone: Vec<&[usize]> = contradicted.chunks(1).collect();
+        let all = (contradicted.len() > 1).then_some(contradicted.as_slice());
+        for together in [alone, all.into_iter().collect()] {
+            let mut best: Option<Decided> = None;
+            for constants in together {
+                let free = self.freed(rows, model, decided, (constants, f64::INFINITY))?;
+                best = best.filter(|best| best.error.total_cmp(&free.error).is_le()).or(Some(free));
+                if best.as_ref().is_some_and(|best| best.error < BADLY) {
+                    break;
+                }
+            }
+            if let Some(best) = best.filter(|best| best.error < EXPLAINED * decided.error) {
+                *decided = best;
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// What a record is where one of its constants is followed in windows, as a stiffness is, beside the others alone; `None` where that is not determined.
@@ -160,7 +194,9 @@ impl Session<'_, '_, '_> {
         let trends = self.trends(rows, decided, fit)?;
         let undecided = self.undecided();
         let growing = decided.model.constant.iter().zip(&trends).filter_map(|(&one, trend)| Some((one, (*trend)?)));
-        let growing = growing.filter(|(one, trend)| undecided.contains(one) && trend.is_conspicuous());
+        // What parts contradict was tried before.
+        let may = |one: &usize| undecided.contains(one) && !decided.differs(*one);
+        let growing = growing.filter(|(one, trend)| may(one) && trend.is_conspicuous());
         let most = growing.max_by(|a, b| a.1.excess().total_cmp(&b.1.excess()));
         Ok(most.map(|(most, _)| most))
     }
@@ -175,7 +211,11 @@ impl Session<'_, '_, '_> {
         let mut free = decided.clone();
         free.slow.extend(others);
         self.set_free(rows, model, &mut free, f64::INFINITY)?;
-        let least = if decided.error < BADLY { A_LITTLE_BETTER } else { BETTER };
+        let least = match decided.error {
+            error if error < BADLY => A_LITTLE_BETTER,
+            error if error < NOISE_MODEL_FAILS => BETTER,
+            _ => EXPLAINED,
+        };
         if free.fit.is_some() && free.error < least * decided.error {
             *decided = free;
         }
@@ -183,13 +223,8 @@ impl Session<'_, '_, '_> {
     }
 
     /// The search for what varies slowly along all of the record, without an end before the last round.
-    pub(crate) fn slow_search<'a>(
-        &self,
-        rows: &'a Rows,
-        ordered: &'a Model,
-        decided: &'a Decided,
-    ) -> slowly_varying::SlowSearch<'a> {
-        slowly_varying::SlowSearch {
+    pub(crate) fn slow_search<'a>(&self, rows: &'a Rows, ordered: &'a Model, decided: &'a Decided) -> SlowSearch<'a> {
+        SlowSearch {
             rows,
             model: ordered,
             coefficients: decided.slow.len(),
@@ -197,6 +232,7 @@ impl Session<'_, '_, '_> {
             expected: decided.expected,
             scales: &decided.scales,
             longest: decided.longest,
+            before: decided.error,
             hopeless: f64::INFINITY,
             breaks: &[],
             simpler: 1.0,
@@ -217,12 +253,12 @@ impl Session<'_, '_, '_> {
         let rest = model.constant.iter().copied().filter(|one| !decided.slow.contains(one)).collect();
         decided.model = Model { constant: rest, ..model.clone() };
         let ordered = decided.ordered();
-        let search = slowly_varying::SlowSearch { hopeless, ..self.slow_search(rows, &ordered, decided) };
+        let search = SlowSearch { hopeless, ..self.slow_search(rows, &ordered, decided) };
         let mut found = slowly_varying::find(&search, first, &mut self.stages)?;
         if !rows.jumps.is_empty() {
             // What jumps may be the inertia as well as the stiffness.
             let simpler = if decided.constants_jump { SIMPLER } else { 1.0 };
-            let jumping = slowly_varying::SlowSearch { breaks: &rows.jumps, simpler, ..search };
+            let jumping = SlowSearch { breaks: &rows.jumps, simpler, ..search };
             let jumping = slowly_varying::find(&jumping, first, &mut self.stages)?;
             // A curve that bends quickly comes near the rows that it was taken from, a jump or not: it is judged by others.
             let predicted = |one: &Option<slowly_varying::SlowCoefficients>| {

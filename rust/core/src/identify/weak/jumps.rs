@@ -60,7 +60,7 @@ impl Session<'_, '_, '_> {
             stride: weak.stride,
             group: 1,
             expected: decided.expected,
-            inflation: decided.error.max(1.0) * if self.noise == self.channel_noise { 1.0 } else { COLOURED },
+            inflation: decided.inflation() * if self.noise == self.channel_noise { 1.0 } else { COLOURED },
             scales: &decided.scales,
             lengths: &lengths,
             instructions: self.options.instructions,

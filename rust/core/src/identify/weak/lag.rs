@@ -323,7 +323,7 @@ impl Session<'_, '_, '_> {
             covariance: &decided.covariance,
             correlated: &correlated,
             expected: decided.expected,
-            inflation: decided.error.max(1.0),
+            inflation: decided.inflation(),
             instructions: self.options.instructions,
         };
         let found = judged.factor(self.rate(), &mut self.stages)?;

@@ -7,8 +7,9 @@ use crate::identify::weak::decide::BADLY;
 use crate::identify::weak::decided::{Decided, rows_of};
 use crate::identify::weak::session::Session;
 use crate::inference::cross_validation::{
-    OVERLAP, RuledOut, Validated, best, better_known, is_inside, near, rule_out, validate,
+    OVERLAP, RuledOut, Validated, better_known, is_inside, longest_as_good, near, rule_out, validate,
 };
+use crate::inference::largest_square::LargestSquare;
 use crate::regression::constants::misfits;
 use crate::regression::fit::Fit;
 use crate::regression::subsample::{are_many, few_stretches, holds, places_of, stretches_of_rows, thinned_rows};
@@ -77,7 +78,7 @@ impl Session<'_, '_, '_> {
         decided.lengths = compared.chain(ruled_out).map(|(scale, error)| (scale.span() * stride, error)).collect();
         decided.lengths.sort_unstable_by_key(|(length, _)| *length);
         // Where no row can be predicted any length is as good, and the longest tells most.
-        let Some(best) = best(&validated).or(validated.last()) else { return Ok(()) };
+        let Some(best) = longest_as_good(&validated).or(validated.last()) else { return Ok(()) };
         // Windows that predict badly follow what is missing, and long ones tell nothing better.
         let best = if best.error < BADLY { better_known(&validated, best) } else { best };
         decided.error = if best.error.is_finite() { best.error } else { 1.0 };
@@ -119,7 +120,7 @@ impl Session<'_, '_, '_> {
         let stretches = few_stretches(rows.len(), lengths).filter(|_| self.is_rough && are_many(rows.len()));
         let Some((stretches, held)) = stretches else { return Ok(None) };
         let validated = self.validate(&thinned_rows(rows, &stretches), decided, &lengths[..held])?;
-        let best = best(&validated).and_then(|best| best.fit.scale);
+        let best = longest_as_good(&validated).and_then(|best| best.fit.scale);
         let is_inside = best
             .is_some_and(|best| held == lengths.len() || !lengths[held.saturating_sub(OVERLAP)..held].contains(&best));
         Ok(is_inside.then_some(ComparedLengths { validated, ruled_out: Vec::new() }))
@@ -136,7 +137,7 @@ impl Session<'_, '_, '_> {
         let Some(before) = before else { return Ok(None) };
         let near = near(before, scales.len());
         let compared = self.compare(&weak.rows, decided, &scales[near.clone()])?;
-        let best = best(&compared.validated).and_then(|best| best.fit.scale);
+        let best = longest_as_good(&compared.validated).and_then(|best| best.fit.scale);
         let place = best.and_then(|best| scales.iter().position(|scale| *scale == best));
         Ok(place.is_some_and(|place| is_inside(place, &near, scales.len())).then_some(compared))
     }
@@ -153,7 +154,7 @@ impl Session<'_, '_, '_> {
         let found = self.validate(&thinned_rows(rows, &stretches), decided, &scales[..short])?;
         let held = lengths.partition_point(|scale| holds(*scale)).saturating_sub(OVERLAP);
         let long = scales.partition_point(|scale| lengths[..held].contains(scale));
-        all(match best(&found).and_then(|best| best.fit.scale) {
+        all(match longest_as_good(&found).and_then(|best| best.fit.scale) {
             Some(best) if short == scales.len() || !scales[long..].contains(&best) => found,
             Some(_) => self.validate(rows, decided, &scales[long..])?,
             // The stretches miss the few rows that there are.
@@ -177,6 +178,12 @@ impl Session<'_, '_, '_> {
     fn validate(&mut self, rows: &Rows, decided: &Decided, scales: &[Scale]) -> Result<Vec<Validated>, Error> {
         let correlated = decided.model.correlated(rows, &decided.covariance, &mut self.stages)?;
         let problem = decided.model.problem(rows, &rows.rhs, self.noise[0], Some(&correlated));
-        validate(&problem, scales, decided.expected, self.options.instructions, &mut self.stages)
+        validate(
+            &problem,
+            (scales, LargestSquare::Growing),
+            decided.expected,
+            self.options.instructions,
+            &mut self.stages,
+        )
     }
 }

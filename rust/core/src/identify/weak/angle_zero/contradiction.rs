@@ -76,7 +76,7 @@ impl Session<'_, '_, '_> {
             }
         })?;
         let dot = |other: &[f64]| weights.iter().zip(other).map(|(a, b)| a * b).sum::<f64>();
-        let variance = decided.error.max(1.0) * dot(&noisy);
+        let variance = decided.inflation() * dot(&noisy);
         Ok(dot(&left).abs() > CONSPICUOUS * variance.sqrt())
     }
 }

@@ -10,6 +10,7 @@ use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decide::{BADLY, BETTER};
 use crate::identify::weak::lag::Settled;
 use crate::identify::weak::session::Session;
+use crate::inference::short_parts::LEFT_OF_SWINGS;
 use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
 use crate::weak_form::test_function::TestFunction;
@@ -22,7 +23,7 @@ impl Session<'_, '_, '_> {
     /// Chooses and decides with an offset that is free in every window where the record is to decide upon it, and where parts of the record have
     /// other offsets, or noise does not explain what a constant one leaves and one seems to be `missed`. Otherwise, or if it is no better, what was
     /// found with a constant one: of the same rows, beside all that is set free there, it must leave far less, and rows that are not predicted badly.
-    /// Where parts of the record differ it need only leave less.
+    /// Where parts of the record differ it need only leave less, but far less where hardly a row is within the noise.
     pub(crate) fn with_windowed_offset(
         &mut self,
         model: &Model,
@@ -33,6 +34,8 @@ impl Session<'_, '_, '_> {
         let differs = constant.1.differs(offset);
         // What was set free since may explain what a free offset was missed for.
         self.free_offset.error = self.free_offset.error.min(constant.1.error);
+        // Where hardly a row is within the noise, parts differ by whatever is missing.
+        let is_lost = constant.1.error >= NOISE_MODEL_FAILS;
         let fails = missed && constant.1.error > NOISE_MODEL_FAILS;
         if self.undecided_offset() != Some(offset) || !(differs || fails) {
             return Ok(constant);
@@ -50,7 +53,10 @@ impl Session<'_, '_, '_> {
         let settled = self.decide_and_choose_again(chosen, &free)?;
         let error = settled.1.error;
         let explains = error < BADLY && !self.varies_too_much(&settled.1);
-        let is_possible = settled.1.fit.is_some() && (differs || explains);
+        let far_better = error < if is_lost { LEFT_OF_SWINGS * constant.1.error } else { f64::INFINITY };
+        // Windows that are hardly longer than the test function follow anything, and most of all where an offset is free in them.
+        let is_told = settled.1.fit.is_some() && !settled.1.has_windows_of_a_function(&settled.0.weak);
+        let is_possible = is_told && (differs && far_better || explains);
         (self.windowed_offset, self.most_slow) = (None, None);
         // Errors are compared on the same rows: those that were chosen beside a constant offset are long enough to hide what drifts.
         let least = if differs { 1.0 } else { BETTER };

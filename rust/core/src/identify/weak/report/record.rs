@@ -18,7 +18,7 @@ use crate::identify::weak::report::errors::Errors;
 use crate::identify::weak::report::explained::Explained;
 use crate::identify::weak::report::filter::{LEAST_CHANGE, LeftOfFilter};
 use crate::identify::weak::session::Session;
-use crate::inference::constancy::NO_CHANCE;
+use crate::inference::constancy::{HARDLY_DIFFERS, NO_CHANCE, Test};
 use crate::inference::identifiability::is_mostly_noise;
 use crate::inference::missing_terms::{Missing, Suspect};
 use crate::inference::signs::Changing;
@@ -123,14 +123,18 @@ impl Session<'_, '_, '_> {
     }
 
     /// Whether a constant differs between parts of the record. An offset that drifts by next to nothing of the torque, as noise of low
-    /// frequencies makes it, is constant enough.
+    /// frequencies makes it, is constant enough, and so is a parameter that was to vary if it does and hardly differs.
     fn is_contradicted(&self, weak: &WeakRows, constants: &[Constant]) -> bool {
         let matters = |one: &Constant, deviation: f64| {
             let value = weak.rows.regressors[one.unknown].value.iter().copied().fold(0.0, f64::max);
             !self.is_still(one.unknown) || (deviation * value).powi(2) > UNEXPLAINED * weak.rows.mean_square()
         };
+        let undecided = self.undecided();
         let differs = |one: &Constant| {
-            one.test.as_ref().is_some_and(|test| test.probability < NO_CHANCE && matters(one, test.deviation))
+            let may_differ = |test: &Test| undecided.contains(&one.unknown) && test.spread < HARDLY_DIFFERS;
+            one.test
+                .as_ref()
+                .is_some_and(|test| test.probability < NO_CHANCE && matters(one, test.deviation) && !may_differ(test))
         };
         constants.iter().any(differs)
     }
