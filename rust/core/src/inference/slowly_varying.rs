@@ -85,7 +85,9 @@ pub(crate) fn find(
     if is_told || !search.is_lost() {
         return Ok(found);
     }
-    let quick = find_by((search, PredictedBy::AllEquations), first, stages)?;
+    // A first round that leaves more than constants do comes to nothing.
+    let worth = SlowSearch { hopeless: search.hopeless.min(search.before), ..*search };
+    let quick = find_by((&worth, PredictedBy::AllEquations), first, stages)?;
     let by_others = found.as_ref().map_or(f64::INFINITY, |found| found.error);
     let is_followed = by_others < EXPLAINED * search.before;
     let stands = |quick: f64| quick < FAR_LESS * by_others && (is_followed || quick < LEFT_WHERE_LOST * search.before);

@@ -106,11 +106,12 @@ impl Session<'_, '_, '_> {
             longest: decided.longest.map(|longest| longest.min(length)),
             ..self.slow_search(rows, &ordered, decided)
         };
+        let most = if is_lost(decided) { LEFT_OF_SWINGS } else { HOPELESS };
         let jumps = (!rows.jumps.is_empty()).then_some(&some.jumps);
         for breaks in std::iter::once(&starts).chain(jumps) {
             let found = slowly_varying::find(&SlowSearch { breaks, ..search }, first, &mut self.stages)?;
             let Some(found) = found else { return Ok(false) };
-            if found.error - 1.0 <= HOPELESS * (before - 1.0) {
+            if found.error - 1.0 <= most * (before - 1.0) {
                 return Ok(false);
             }
         }
