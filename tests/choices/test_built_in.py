@@ -31,6 +31,14 @@ def test_the_table_here_holds_the_functions() -> None:
         np.testing.assert_array_equal(BUILT_IN[name].function(np, angle, known), function(0.0, angle, velocity))
 
 
+def test_a_spring_that_softens_may_be_a_pendulum() -> None:
+    # On angles below 1 rad a record hardly tells the cube from the sine.
+    assert BUILT_IN["cubic"].suspected(-1.0, "-1.0 ± 0.1 N m/rad^3") == (
+        "the spring seems to soften, by -1.0 ± 0.1 N m/rad^3 (so does a pendulum's: then it is 'gravity')"
+    )
+    assert "pendulum" not in BUILT_IN["cubic"].suspected(1.0, "1.0 ± 0.1 N m/rad^3")
+
+
 def test_there_is_one_table_here_and_one_in_the_core() -> None:
     linear = [name for name, term in BUILT_IN.items() if not term.inner]
     assert linear == _core.built_in_terms()
