@@ -42,6 +42,14 @@ def test_a_joint_is_found_by_what_its_channels_are_called(
     assert (found["position"], found.get("velocity"), found["effort"]) == expected
 
 
+@pytest.mark.parametrize("joint", ["q1", "torque_arm", "left_q1_joint", "elbow"])
+@pytest.mark.parametrize("form", ["{}.{}", "/arm/{}/{}", "{1}/{0}"])
+def test_a_joint_may_be_called_by_a_word_for_what_is_measured(joint: str, form: str) -> None:
+    channels = [form.format(one, quantity) for one in (joint, "other") for quantity in ("position", "effort")]
+    found = joint_of(channels, joint, "run.mcap")
+    assert found == {quantity: form.format(joint, quantity) for quantity in ("position", "effort")}
+
+
 @pytest.mark.parametrize(
     ("channels", "joint", "words"),
     [
