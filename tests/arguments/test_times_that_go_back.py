@@ -29,6 +29,12 @@ def test_a_counter_that_begins_again_is_named(ticks: float) -> None:
     assert "sort" not in words
 
 
+def test_trials_below_each_other_are_to_be_cut() -> None:
+    """They were to be unwrapped, which joins them."""
+    words = refused(np.tile(np.arange(400) / 500, 5))
+    assert "if trials follow one another, cut the record where each begins and give a list of them" in words
+
+
 def test_a_clock_that_was_set_back_once_is_no_counter() -> None:
     words = refused(COUNT / 500 - (COUNT > 700))
     assert "or cut the record where its clock was set back" in words

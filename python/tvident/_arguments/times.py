@@ -277,7 +277,8 @@ def _cure_of_counter(seconds: Seconds) -> str:
     turn = float(np.median(turns))
     return (
         f"it goes back {turns.size} times by the same, as a counter does that begins again after {turn:.6g} s: unwrap it by that "
-        f"(numpy.unwrap), or give sample_rate={1 / usual:.6g} if samples were taken evenly"
+        f"(numpy.unwrap), or give sample_rate={1 / usual:.6g} if samples were taken evenly; if trials follow one another, cut the "
+        "record where each begins and give a list of them"
     )
 
 
