@@ -97,6 +97,26 @@ def test_a_dimension_of_words_names_the_columns(tmp_path: Path, rig: tvident.Rec
     more: Any = {"sample_rate": 1000, "method": "paper"}
     found = tvident.identify_file(path, "out.npy", angle="arm.angle", torque="arm.torque", **more)
     assert found.samples == SAMPLES
+    whole = tvident.identify(rig.angle, rig.torque, **more)
+    assert np.array_equal(np.load("out.npy")["stiffness"], whole.stiffness, equal_nan=True)
+
+
+def test_trials_in_records_are_read_along_each(tmp_path: Path, rig: tvident.Recording) -> None:
+    # Beside four bytes of another variable a record of eight-byte numbers does not begin at a multiple of eight.
+    path = tmp_path / "run.nc"
+    channels = np.stack([rig.angle, rig.torque, rig.angle[::-1]])
+    with netcdf_file(path, "w") as file:
+        file.createDimension("trial", None)
+        file.createDimension("time", SAMPLES)
+        values = file.createVariable("value", "f8", ("trial", "time"))
+        number = file.createVariable("number", "i4", ("trial",))
+        for trial, channel in enumerate(channels):
+            values[trial] = channel
+            number[trial] = trial
+    more: Any = {"sample_rate": 1000, "method": "paper"}
+    tvident.identify_file(path, "out.npy", angle="value.0", torque="value.1", **more)
+    whole = tvident.identify(rig.angle, rig.torque, **more)
+    assert np.array_equal(np.load("out.npy")["stiffness"], whole.stiffness, equal_nan=True)
 
 
 @pytest.mark.parametrize(

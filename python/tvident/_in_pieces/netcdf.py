@@ -65,12 +65,25 @@ def channels_in(path: Path) -> tuple[Channels, Callable[[], object]]:
     if is_old:
         return _of_version_3(path), lambda: None
     file = opened_by_h5py(path, "netCDF 4")
+    try:
+        return _of_version_4(file), file.close
+    except (OSError, KeyError, RuntimeError) as error:
+        file.close()
+        raise FileError(
+            f"{printable(path)}: must be whole; h5py says: {printable(error, 200)}; copy it again"
+        ) from None
+    except BaseException:
+        file.close()
+        raise
+
+
+def _of_version_4(file: Any) -> Channels:
     found: Channels = {}
     for name, dataset, labels in numbers_of_netcdf_4(file, []):
         meaning = netcdf_meaning(dataset.attrs)
         for called, axis, place in _vectors(name, dataset, meaning, labels):
             found[called] = _AsMeant(_OfDataset(dataset, axis, place), meaning), dataset.shape[axis]
-    return found, file.close
+    return found
 
 
 def _vectors(
@@ -139,10 +152,12 @@ def _places(file: Any) -> list[_Lying]:
     found = []
     for name, variable, labels in numbers_of_netcdf_3(file, []):
         data, meaning = variable.data, netcdf_meaning(dict(variable._attributes))  # noqa: SLF001 - as SciPy keeps them
-        # Records hold a sample of every variable that grows, rows of a matrix one of every column.
-        begin = records if variable.isrec else begins[name]
         for called, axis, place in _vectors(name, data, meaning, labels):
             size = data.strides[axis]
-            at = begins[name] - begin + sum(one * stride for one, stride in zip(place, data.strides, strict=True))
+            lies = begins[name] + sum(one * stride for one, stride in zip(place, data.strides, strict=True))
+            # Records hold a sample of every variable that grows, rows of a matrix one of every column; a vector within a record lies alone.
+            begin = begins[name] + (place[0] * data.strides[0] if axis else 0)
+            begin = records if variable.isrec and not axis else begin
+            at = lies - begin
             found.append(_Lying(called, begin + at - at % size, size, at % size, data.dtype, data.shape[axis], meaning))
     return found
