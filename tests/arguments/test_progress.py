@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,10 @@ def test_a_bar_never_goes_back(capsys: pytest.CaptureFixture[str]) -> None:
         assert report is not None
         for of in TOLD:
             report(*of)
-    assert "100%" in capsys.readouterr().err
+        report(0, 0)
+    shown = [int(part) for part in re.findall(r"(\d+)%", capsys.readouterr().err)]
+    assert shown == sorted(shown)
+    assert shown[-1] == 100
 
 
 def test_work_that_fails_or_tells_nothing_is_not_told_to_be_done() -> None:

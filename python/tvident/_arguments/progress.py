@@ -26,9 +26,11 @@ class ForwardProgress:
         self._told = (0, 0)
 
     def __call__(self, done: int, total: int) -> object:
-        """Tell the work done, or what was told before where that was a larger part of its whole."""
+        """Tell the work done, or what was told before where that was a larger part of its whole; nothing once the whole was told."""
+        if self._told[0] == self._told[1] > 0:
+            return None
         done = max(0, min(done, total - 1))
-        if done * self._told[1] >= self._told[0] * total:
+        if total > 0 and done * self._told[1] >= self._told[0] * total:
             self._told = (done, total)
         return self._report(*self._told)
 
