@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, Literal
 
 import numpy as np
@@ -56,8 +57,12 @@ def asked_of_exchanged(
     except ValueError:
         return None
     left = unexplained(found).share
-    if not (is_right(found) and left <= NEXT_TO_NOTHING and left <= _MUCH_BETTER * unexplained(usual()).share):
+    if not (is_right(found) and left <= NEXT_TO_NOTHING):
         return None
+    # Where they determine nothing as they are, nothing is explained.
+    with suppress(ValueError):
+        if left > _MUCH_BETTER * unexplained(usual()).share:
+            return None
     return (
         f"{SWAPPED} With one in the other's place inertia, damping and stiffness are positive, "
         f"and {percent(1 - left)} {TRIED}: exchange them"
