@@ -159,7 +159,8 @@ fn find_by(
         }
         let is_last = is_settled || error > search.hopeless || is_enough(round, (before, error));
         let mut predicted = error;
-        if (is_last || search.is_lost()) && !rows.jumps.is_empty() {
+        if !rows.jumps.is_empty() {
+            // The next round may come to nothing.
             let rhs = without(rows, &rows.rhs, slow, &leave_gap_out);
             let problem = rest.problem(rows, &rhs, noise, None);
             let fit = Fit::with_leave_gap_out(&problem, best, expected, instructions, stages)?;

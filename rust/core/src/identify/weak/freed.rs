@@ -75,7 +75,8 @@ impl Session<'_, '_, '_> {
             decided.longest = self.swinging(rows, decided)?.and_then(|one| one.longest);
         }
         let alone: Vec<&[usize]> = contradicted.chunks(1).collect();
-        let all = (contradicted.len() > 1).then_some(contradicted.as_slice());
+        let may = self.most_slow.is_none_or(|most| decided.slow.len() + contradicted.len() <= most);
+        let all = (may && contradicted.len() > 1).then_some(contradicted.as_slice());
         for together in [alone, all.into_iter().collect()] {
             let mut best: Option<Decided> = None;
             for constants in together {

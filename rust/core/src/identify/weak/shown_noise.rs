@@ -12,6 +12,7 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::identify::scanned::Scans;
+use crate::identify::weak::angle_zero::outcome::FreeOffset;
 use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
@@ -111,6 +112,8 @@ impl Session<'_, '_, '_> {
         let mut again = self.choose_first(model, &mut None)?;
         let found = self.decide(&mut again, model)?;
         if found.fit.is_some() && found.error <= MORE {
+            // Whether an offset was missed was asked with more noise.
+            self.free_offset = FreeOffset::default();
             *chosen = again;
             return Ok(found);
         }
