@@ -34,7 +34,7 @@ def test_the_table_here_holds_the_functions() -> None:
 def test_a_spring_that_softens_may_be_a_pendulum() -> None:
     # On angles below 1 rad a record hardly tells the cube from the sine.
     assert BUILT_IN["cubic"].suspected(-1.0, "-1.0 ± 0.1 N m/rad^3") == (
-        "the spring seems to soften, by -1.0 ± 0.1 N m/rad^3 (so does a pendulum's: then it is 'gravity')"
+        "the spring seems to soften: -1.0 ± 0.1 N m/rad^3 (so does a pendulum's: then it is 'gravity')"
     )
     assert "pendulum" not in BUILT_IN["cubic"].suspected(1.0, "1.0 ± 0.1 N m/rad^3")
 

@@ -111,7 +111,7 @@ BUILT_IN = {
             angle_period=None,
             spring="beside",
             is_sought=True,
-            negative_suspicion="the spring seems to soften, by {amount} (so does a pendulum's: then it is 'gravity')",
+            negative_suspicion="the spring seems to soften: {amount} (so does a pendulum's: then it is 'gravity')",
         ),
         BuiltIn(
             "preload",
