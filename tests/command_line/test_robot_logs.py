@@ -57,6 +57,14 @@ def test_clocks_that_are_no_choice_are_named(tmp_path: Path, clocks: tuple[str, 
     assert words in done.output
 
 
+def test_a_clock_that_is_named_and_is_not_there_is_no_other(tmp_path: Path) -> None:
+    file = written(tmp_path / "run.csv", stamp=RIG.time, q_0=RIG.angle, tau_0=RIG.torque)
+    assert CliRunner().invoke(main, ["identify", file, "--joint", "0"]).exit_code == 0
+    done = CliRunner().invoke(main, ["identify", file, "--joint", "0", "--time", "time"])
+    assert done.exit_code == 2
+    assert "no channel 'time'" in done.output
+
+
 def test_compare_takes_a_joint_too(tmp_path: Path) -> None:
     file = written(tmp_path / "run.csv", time=RIG.time, q_0=RIG.angle, tau_J_0=RIG.torque)
     done = CliRunner().invoke(main, ["compare", file, "--joint", "0"])

@@ -19,7 +19,7 @@ TIME = "time"
 
 
 def named(options: Mapping[str, Any], file: str | None) -> dict[str, Any]:
-    """Return options with what a joint's angle, torque and stamps are called; refuse options that name no channels."""
+    """Return options with what a joint's angle and torque are called; refuse options that name no channels."""
     missing = [name for name in ("angle", "torque") if options[name] is None]
     joint = options["joint"]
     if joint is None:
@@ -35,10 +35,18 @@ def named(options: Mapping[str, Any], file: str | None) -> dict[str, Any]:
         return dict(options)
     if len(missing) < 2:  # noqa: PLR2004 - angle and torque
         raise click.UsageError("--joint stands for --angle and --torque; got one of these too; drop it")
-    of_joint = {"angle": f"{joint}.position", "torque": f"{joint}.effort"}
-    if not any(options.get(name) for name in ("sample_rate", "delta", "time_channel")):
-        of_joint["time_channel"] = TIME
-    return {**options, **of_joint}
+    return {**options, "angle": f"{joint}.position", "torque": f"{joint}.effort"}
+
+
+def with_stamps(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return options with what a joint's stamps are called in a bag, where nothing tells the times."""
+    return {**options, "time_channel": TIME} if _lacks_clock(options) else dict(options)
+
+
+def _lacks_clock(options: Mapping[str, Any]) -> bool:
+    """Return whether a joint is named, and nothing that tells the times."""
+    clocks = ("sample_rate", "delta", "time_channel")
+    return options["joint"] is not None and not any(options.get(name) for name in clocks)
 
 
 def with_joint(options: Mapping[str, Any], channels: recordings.Channels, file: str | None) -> dict[str, Any]:
@@ -49,9 +57,11 @@ def with_joint(options: Mapping[str, Any], channels: recordings.Channels, file: 
         return rest
     of_joint = joint_of(channels, joint, file or "the command line")
     rest |= {"angle": of_joint["position"], "torque": of_joint["effort"]}
-    if rest["time_channel"] == TIME and not any(_last(name) == TIME for name in channels):
-        clocks = list(dict.fromkeys(time_channels(channels)))
-        clocks = clocks or [named_unit(name)[0] for name in increasing_times(channels)]
+    if _lacks_clock(options):
+        stamps = (
+            [TIME] if any(_last(name) == TIME for name in channels) else list(dict.fromkeys(time_channels(channels)))
+        )
+        clocks = stamps or [named_unit(name)[0] for name in increasing_times(channels)]
         # Of several none is chosen: what asks for the sample period names them.
         rest["time_channel"] = clocks[0] if len(clocks) == 1 else None
     if "velocity" not in rest or rest["velocity"] is not None or "velocity" not in of_joint:
