@@ -14,6 +14,9 @@ from tvident import Status
 RATE = 500.0
 MEAN = {"inertia": 0.0123, "damping": 0.025}
 CLOSE = 4.0
+"""Standard errors by which parameters may be off beside a friction that no term describes."""
+FOLLOWED = 0.02
+"""Relative error of an inertia that varies by 30 %: a constant one is 22 % off, and frictions of 5 and 10 % leave .4 to 1.5 %."""
 
 
 def with_friction(
@@ -46,7 +49,7 @@ def test_what_varies_is_followed_and_the_friction_named(name: str, friction: flo
     for one in ("inertia", "damping", "stiffness"):
         off = (getattr(result, one) - getattr(rig, one)) / result.stderr[one]
         assert np.sqrt(np.mean(off**2)) < CLOSE
-    assert np.sqrt(np.mean((result.inertia / rig.inertia - 1) ** 2)) < 0.02
+    assert np.sqrt(np.mean((result.inertia / rig.inertia - 1) ** 2)) < FOLLOWED
     assert result.summary().startswith("do not trust: another equation explains more")
     assert any("friction" in line for line in result.advice)
 

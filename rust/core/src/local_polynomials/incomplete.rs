@@ -382,7 +382,7 @@ mod tests {
                     if other.sigma.is_nan() {
                         continue;
                     }
-                    // Samples are rounded by 1e-16, of 1e-10 of noise, which weights of 1e6 beside 1 make a thousandth.
+                    // Samples are rounded by 1e-6 of a noise of 1e-10; weights of 1e6 beside 1 make a thousandth of that, on either side.
                     let rounding = if signal == 1 { 2e-3 } else { 0.0 };
                     let near =
                         |one: f64, other: f64, scale: f64| (one - other).abs() <= (10.0 * LOST + rounding) * scale;
@@ -396,7 +396,7 @@ mod tests {
                 }
             }
         }
-        // The last digits of most tell that they were found in another way.
+        // The last digits of a quarter and more tell that they were found in another way.
         assert!(from_moments > SIGNALS.len() * WEIGHTS.len() * SAMPLES, "{from_moments}");
     }
 }
