@@ -50,6 +50,19 @@ def test_a_joint_may_be_called_by_a_word_for_what_is_measured(joint: str, form: 
     assert found == {quantity: form.format(joint, quantity) for quantity in ("position", "effort")}
 
 
+@pytest.mark.parametrize("form", ["{}.{}", "/arm/{}/{}"])
+def test_the_last_word_says_what_is_measured(form: str) -> None:
+    channels = [form.format("theta", quantity) for quantity in ("position", "effort")]
+    assert list(joint_of(channels, "theta", "run.mcap").values()) == channels
+
+
+def test_a_joint_is_taken_before_those_that_end_as_it_is_called() -> None:
+    every = [f"{joint}.{quantity}" for joint in ("elbow", "left.elbow") for quantity in ("position", "effort")]
+    assert joint_of(every, "elbow", "run.mcap") == {"position": "elbow.position", "effort": "elbow.effort"}
+    with pytest.raises(KeyError, match=r"position left\.elbow\.position and effort right\.elbow\.effort"):
+        joint_of(["left.elbow.position", "right.elbow.effort"], "elbow", "run.mcap")
+
+
 @pytest.mark.parametrize(
     ("channels", "joint", "words"),
     [

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from contextlib import suppress
 
 from tvident._files.channels import full_name, parts_of
 from tvident._files.names import listed, printable
@@ -37,11 +36,10 @@ def joint_of(channels: Iterable[str], joint: str, source: str) -> dict[str, str]
         If there is no such joint, or what is called so may be several: the message lists them.
     """
     every = dict.fromkeys(channels)
-    if called := _called_alike(every, joint, source):
-        return called
     joints = _joints(every)
     wanted = _words(joint)
-    found = {name: parts for name, parts in joints.items() if _words(name)[-len(wanted) :] == wanted}
+    ending = {name: parts for name, parts in joints.items() if _words(name)[-len(wanted) :] == wanted}
+    found = {name: parts for name, parts in ending.items() if _words(name) == wanted} or ending
     place, asked = printable(source), printable(joint, 60)
     if not found:
         whole = [name for name, parts in joints.items() if {"position", "effort"} <= parts.keys()]
@@ -64,25 +62,16 @@ def joint_of(channels: Iterable[str], joint: str, source: str) -> dict[str, str]
     )
 
 
-def _called_alike(channels: dict[str, None], joint: str, source: str) -> dict[str, str]:
-    """Return the channels of a joint whose names are its own with what they are behind it; nothing if one is missing."""
-    found = {}
-    for quantity in _QUANTITIES:
-        with suppress(KeyError):
-            found[quantity] = full_name(channels, f"{joint}.{quantity}", source)
-    return found if {"position", "effort"} <= found.keys() else {}
-
-
 def _joints(channels: Iterable[str]) -> dict[str, dict[str, list[str]]]:
     """Return what may be joints: their channels by what they are."""
     found: dict[str, dict[str, list[str]]] = {}
     for name in channels:
-        # A part that is one of the words says what the channel is, whatever words the joint's name holds.
+        # The last part that is one of the words says what the channel is, whatever words the joint's name holds.
         parts = parts_of(named_unit(name)[0])
-        whole = [part for part in parts if part.lower() in _OF_WORD]
-        if len(whole) == 1 and len(parts) > 1:
-            joint = ".".join(part for part in parts if part is not whole[0])
-            found.setdefault(joint, {}).setdefault(_OF_WORD[whole[0].lower()], []).append(name)
+        places = [place for place, part in enumerate(parts) if part.lower() in _OF_WORD]
+        if places and len(parts) > 1:
+            quantity = _OF_WORD[parts.pop(places[-1]).lower()]
+            found.setdefault(".".join(parts), {}).setdefault(quantity, []).append(name)
             continue
         bare = _NUMBERED.sub(r"\1_\2", _TAU_J.sub("tau", named_unit(name)[0]))
         left, quantities = [], []
