@@ -106,27 +106,35 @@ impl SlowSearch<'_> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::regression::simulated::{model, rows, white};
-
-    #[test]
-    fn windows_are_no_longer_than_they_may_be_and_compare_bandwidths_where_rows_are_predicted_badly() {
-        let (rows, model, scales) = (rows(400, |_| [1.0, 0.0], 0.1), model(), Scale::all(400, 3));
-        let search = SlowSearch {
-            rows: &rows,
-            model: &model,
+impl<'a> SlowSearch<'a> {
+    /// The search for one coefficient in simulated rows whose noise has a deviation.
+    pub(crate) fn simulated(rows: &'a Rows, model: &'a Model, scales: &'a [Scale], deviation: f64) -> Self {
+        SlowSearch {
+            rows,
+            model,
             coefficients: 1,
             noise: 0.0,
-            expected: white(0.01),
-            scales: &scales,
+            expected: crate::regression::simulated::white(deviation * deviation),
+            scales,
             longest: None,
             before: 1.0,
             hopeless: f64::INFINITY,
             breaks: &[],
             simpler: 1.0,
             instructions: Instructions::Scalar,
-        };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::regression::simulated::{model, rows};
+
+    #[test]
+    fn windows_are_no_longer_than_they_may_be_and_compare_bandwidths_where_rows_are_predicted_badly() {
+        let (rows, model, scales) = (rows(400, |_| [1.0, 0.0], 0.1), model(), Scale::all(400, 3));
+        let search = SlowSearch::simulated(&rows, &model, &scales, 0.1);
         let (shortest, longest) = (scales[0], *scales.last().expect("lengths"));
         // So many constants that the shortest windows do not hold the rows that determine them.
         let layout = Layout { windowed: 1, linear: true, constant: 2 * shortest.one_sided() };

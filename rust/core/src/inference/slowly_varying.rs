@@ -111,7 +111,7 @@ fn find_by(
     let mut most = (shortest.unwrap_or(0) / STRETCH).min(search.longest.unwrap_or(usize::MAX));
     let mut scale = search.next_length(first, most, model.layout());
     let mut found: Option<SlowCoefficients> = None;
-    let mut last: Option<f64> = None;
+    let (mut last, mut without_near): (Option<f64>, Option<(Varying, f64)>) = (None, None);
     let mut few = FewRows::of(rows, scales);
     for round in 1.. {
         let (current, before) = (found.as_ref().map(|found| &found.varying), found.as_ref().map(|found| found.error));
@@ -158,15 +158,6 @@ fn find_by(
             break;
         }
         let is_last = is_settled || error > search.hopeless || is_enough(round, (before, error));
-        let mut predicted = error;
-        if !rows.jumps.is_empty() {
-            // The next round may come to nothing.
-            let rhs = without(rows, &rows.rhs, slow, &leave_gap_out);
-            let problem = rest.problem(rows, &rhs, noise, None);
-            let fit = Fit::with_leave_gap_out(&problem, best, expected, instructions, stages)?;
-            let rows = ComparedRows::new(&problem, scales, LargestSquare::Growing);
-            predicted = fit.map_or(f64::INFINITY, |fit| rows.error(&problem, best, &fit, expected.variance)) - excess;
-        }
         found = Some(SlowCoefficients {
             varying,
             rhs,
@@ -174,16 +165,40 @@ fn find_by(
             scale: best,
             equations_of: scale,
             error,
-            predicted,
+            predicted: error,
             reach,
             terms,
         });
+        without_near = Some((leave_gap_out, excess));
         if is_last {
             break;
         }
         scale = search.next_length(best, most, model.layout());
     }
+    if let (Some(found), Some(curve)) = (&mut found, without_near)
+        && !rows.jumps.is_empty()
+    {
+        found.predicted = predicted(search, found, curve, stages)?;
+    }
     Ok(found)
+}
+
+/// The error of predicting rows with a curve from equations without them, as noise of that excess over what is expected leaves it.
+fn predicted(
+    search: &SlowSearch<'_>,
+    found: &SlowCoefficients,
+    (curve, excess): (Varying, f64),
+    stages: &mut Stages<'_, '_>,
+) -> Result<f64, Error> {
+    let &SlowSearch { rows, model, coefficients, noise, expected, scales, instructions, .. } = search;
+    let (slow, rest) = model.constant.split_at(coefficients);
+    let rest = Model { constant: rest.to_vec(), taken: found.taken.clone(), ..model.clone() };
+    let rhs = without(rows, &rows.rhs, slow, &curve);
+    let problem = rest.problem(rows, &rhs, noise, None);
+    let fit = Fit::with_leave_gap_out(&problem, found.scale, expected, instructions, stages)?;
+    let rows = ComparedRows::new(&problem, scales, LargestSquare::Growing);
+    let error = fit.map_or(f64::INFINITY, |fit| rows.error(&problem, found.scale, &fit, expected.variance));
+    Ok(error - excess)
 }
 
 /// What slow coefficients would follow of another right-hand side with the bandwidth that was found, or `None` if they are not determined: as much more of
@@ -227,7 +242,6 @@ pub(crate) fn without(rows: &Rows, rhs: &[f64], slow: &[usize], varying: &Varyin
 mod tests {
     use super::*;
     use crate::regression::simulated::{CONSTANTS, PERIOD, model, rows, staged, white};
-    use crate::simd::instructions::Instructions;
 
     const ROWS: usize = 1200;
     const DEVIATION: f64 = 0.1;
@@ -257,20 +271,7 @@ mod tests {
     }
 
     fn search<'a>(rows: &'a Rows, model: &'a Model, scales: &'a [Scale]) -> SlowSearch<'a> {
-        SlowSearch {
-            rows,
-            model,
-            coefficients: 1,
-            noise: 0.0,
-            expected: white(DEVIATION * DEVIATION),
-            scales,
-            longest: None,
-            before: 1.0,
-            hopeless: f64::INFINITY,
-            breaks: &[],
-            simpler: 1.0,
-            instructions: Instructions::Scalar,
-        }
+        SlowSearch::simulated(rows, model, scales, DEVIATION)
     }
 
     /// What a search for one coefficient that varies finds, which begins with windows of a length.

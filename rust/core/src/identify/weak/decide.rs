@@ -15,7 +15,6 @@ use crate::inference::missing_terms::JudgedTerm;
 use crate::inference::part_constants::{NoiseFrom, TestNoise};
 use crate::inference::trend::tilted;
 use crate::regression::fit::Fit;
-use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
 use crate::regression::subsample::stretches_of_rows;
 use crate::regression::window_length::Scale;
@@ -178,7 +177,7 @@ impl Session<'_, '_, '_> {
                     decided.longest = self.swinging(rows, &decided)?.and_then(|one| one.longest);
                 }
                 self.set_free(rows, &model, &mut decided, f64::INFINITY)?;
-                let is_lost = |before: &Decided| decided.error >= NOISE_MODEL_FAILS.max(before.error);
+                let is_lost = |before: &Decided| decided.is_lost() && decided.error >= before.error;
                 if let Some(before) = before.take().filter(is_lost) {
                     // A curve beside which rows are lost explains no difference between parts.
                     decided = before;
@@ -187,7 +186,7 @@ impl Session<'_, '_, '_> {
             }
             let worst = self.test(rows, &mut decided)?;
             let asked = changing.next();
-            let is_lost = asked.is_none() && !model.windowed.is_empty() && decided.error >= NOISE_MODEL_FAILS;
+            let is_lost = asked.is_none() && !model.windowed.is_empty() && decided.is_lost();
             let may_vary = self.most_slow.is_none_or(|most| decided.slow.len() < most);
             if worst.is_some() && is_lost && may_vary {
                 is_free = self.set_contradicted_free(rows, &model, &mut decided)?;

@@ -12,6 +12,7 @@ use crate::inference::largest_square::MOST;
 use crate::inference::slowly_varying;
 use crate::regression::constants::Expected;
 use crate::regression::fit::Fit;
+use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
 use crate::regression::problem::{Correlated, Problem};
 use crate::regression::row_covariance::RowCovariance;
@@ -87,6 +88,11 @@ impl Decided {
     /// Whether constants seem to vary and windows are the shortest of those that were tried.
     pub(crate) fn follows_anything(&self) -> bool {
         !self.slow.is_empty() && self.has_shortest_windows()
+    }
+
+    /// Whether rows are predicted so badly that hardly one is within the noise.
+    pub(crate) fn is_lost(&self) -> bool {
+        self.error >= NOISE_MODEL_FAILS
     }
 
     /// What tests multiply the variance of the noise by: predictions leave as much, but beyond a limit what is missing from the equation would hide what

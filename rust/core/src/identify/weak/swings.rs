@@ -12,7 +12,6 @@ use crate::inference::cross_validation::best_length;
 use crate::inference::short_parts::{LEFT_OF_SWINGS, LEFT_WHERE_LOST, Swinging, swinging};
 use crate::inference::slow_lengths::SlowSearch;
 use crate::inference::slowly_varying;
-use crate::regression::limits::NOISE_MODEL_FAILS;
 use crate::regression::model::Model;
 use crate::regression::subsample::{holds, places_of, stretches_of_rows, thinned_rows};
 use crate::regression::window_length::Scale;
@@ -36,7 +35,7 @@ impl Session<'_, '_, '_> {
         let is_open = undecided.contains(&swinging);
         let rows = if is_open { Cow::Borrowed(rows) } else { Cow::Owned(without_rate(rows, swinging)) };
         let mut explained = self.swinging_explained(&rows, model, decided, &[swinging])?;
-        if explained.is_none() && is_open && undecided.len() > 1 && is_lost(decided) {
+        if explained.is_none() && is_open && undecided.len() > 1 && decided.is_lost() {
             explained = self.swinging_explained(&rows, model, decided, &undecided)?;
         }
         let Some(free) = explained else { return Ok(false) };
@@ -70,10 +69,9 @@ impl Session<'_, '_, '_> {
         }
         let excess = (decided.error - 1.0).max(0.0);
         let free = self.freed(rows, model, decided, (constants, 1.0 + HOPELESS * excess))?;
-        let is_lost = is_lost(decided);
-        let most = if is_lost { LEFT_WHERE_LOST } else { LEFT_OF_SWINGS };
+        let most = if decided.is_lost() { LEFT_WHERE_LOST } else { LEFT_OF_SWINGS };
         let is_explained = free.error - 1.0 < most * excess && free.error < A_LITTLE_BETTER * decided.error;
-        Ok(Some(free).filter(|free| is_explained && (!is_lost || is_of_a_machine(free))))
+        Ok(Some(free).filter(|free| is_explained && (!decided.is_lost() || is_of_a_machine(free))))
     }
 
     /// Whether stretches of a long record say that it is not worth following some constants along all of it: even a curve of its own in each leaves too much
@@ -106,7 +104,7 @@ impl Session<'_, '_, '_> {
             longest: decided.longest.map(|longest| longest.min(length)),
             ..self.slow_search(rows, &ordered, decided)
         };
-        let most = if is_lost(decided) { LEFT_OF_SWINGS } else { HOPELESS };
+        let most = if decided.is_lost() { LEFT_OF_SWINGS } else { HOPELESS };
         let jumps = (!rows.jumps.is_empty()).then_some(&some.jumps);
         for breaks in std::iter::once(&starts).chain(jumps) {
             let found = slowly_varying::find(&SlowSearch { breaks, ..search }, first, &mut self.stages)?;
@@ -124,9 +122,4 @@ impl Session<'_, '_, '_> {
 fn is_of_a_machine(free: &Decided) -> bool {
     let Some(found) = &free.found else { return false };
     (0..free.slow.len()).all(|coefficient| found.varying.mean(coefficient) > 0.0)
-}
-
-/// Whether rows are predicted so badly that hardly one is within the noise.
-fn is_lost(decided: &Decided) -> bool {
-    decided.error >= NOISE_MODEL_FAILS
 }

@@ -34,8 +34,6 @@ impl Session<'_, '_, '_> {
         let differs = constant.1.differs(offset);
         // What was set free since may explain what a free offset was missed for.
         self.free_offset.error = self.free_offset.error.min(constant.1.error);
-        // Where hardly a row is within the noise, parts differ by whatever is missing.
-        let is_lost = constant.1.error >= NOISE_MODEL_FAILS;
         let fails = missed && constant.1.error > NOISE_MODEL_FAILS;
         if self.undecided_offset() != Some(offset) || !(differs || fails) {
             return Ok(constant);
@@ -53,7 +51,8 @@ impl Session<'_, '_, '_> {
         let settled = self.decide_and_choose_again(chosen, &free)?;
         let error = settled.1.error;
         let explains = error < BADLY && !self.varies_too_much(&settled.1);
-        let far_better = error < if is_lost { LEFT_OF_SWINGS * constant.1.error } else { f64::INFINITY };
+        // Where hardly a row is within the noise, parts differ by whatever is missing.
+        let far_better = error < if constant.1.is_lost() { LEFT_OF_SWINGS * constant.1.error } else { f64::INFINITY };
         // Windows that are hardly longer than the test function follow anything, and most of all where an offset is free in them.
         let is_told = settled.1.fit.is_some() && !settled.1.has_windows_of_a_function(&settled.0.weak);
         let is_possible = is_told && (differs && far_better || explains);
