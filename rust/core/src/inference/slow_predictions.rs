@@ -6,7 +6,7 @@ use crate::inference::slow_equations::Slow;
 use crate::regression::constants::Expected;
 use crate::regression::problem::Problem;
 use crate::regression::solved::is_determined;
-use crate::regression::subsample::rows_all_over;
+use crate::regression::subsample::{Compare, rows_all_over};
 use crate::regression::window_length::Scale;
 
 /// The largest squared error over the noise's variance that counts, where noise explains the usual one.
@@ -17,17 +17,30 @@ const MOST: f64 = 25.0;
 pub(crate) enum PredictedBy {
     /// Those without the equations near it.
     OtherEquations,
-    /// Those with all equations, where what is left is far more than noise.
+    /// Those with all equations, where what is left is far more than noise: there curves without the equations near a row may not follow what moves quickly.
+    /// All of these are worse than what predicts with noise alone.
     AllEquations,
 }
 
 /// How well slow coefficients predict rows.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Prediction {
-    /// Mean squared error over the noise's variance.
+    /// Mean squared error over the noise's variance, from equations without the row.
     pub(crate) error: f64,
+    /// The same by all equations, if they are to predict.
+    by_all: Option<f64>,
     /// By how much of its variance the noise of a row is more than expected, with the coefficients that were found.
     pub(crate) excess: f64,
+}
+
+impl Prediction {
+    /// The error by which curves are compared in one way.
+    pub(crate) fn by(self, way: PredictedBy) -> f64 {
+        match way {
+            PredictedBy::OtherEquations => self.error,
+            PredictedBy::AllEquations => self.by_all.unwrap_or(self.error),
+        }
+    }
 }
 
 /// The rows that curves are to predict, with what is the same for all curves.
@@ -51,8 +64,8 @@ struct PredictedRow {
 }
 
 impl<'a, 'b> PredictedRows<'a, 'b> {
-    /// The rows that windows of a length predict: of many some.
-    pub(crate) fn new(slow: &'a Slow<'a>, problem: &'a Problem<'b>, scale: Scale) -> Self {
+    /// The rows that windows of a length predict: of many some, all over the record.
+    pub(crate) fn new(slow: &'a Slow<'a>, problem: &'a Problem<'b>, (scale, compare): (Scale, Compare)) -> Self {
         let solved = slow.fit.leave_gap_out.as_ref();
         let solutions = solved.map_or_else(Vec::new, |solved| {
             let (fields, layout) = (solved.fields, problem.layout);
@@ -64,7 +77,7 @@ impl<'a, 'b> PredictedRows<'a, 'b> {
             let place = solved.place(cell).filter(|&place| is_determined(solved, place))?;
             Some(PredictedRow { row, place, later: (row as f64 - scale.centres(cell)[1]) * problem.period })
         };
-        let usable = rows_all_over(slow.rows).filter(|&row| problem.usable[row]);
+        let usable = rows_all_over(slow.rows, compare).filter(|&row| problem.usable[row]);
         let rows: Vec<PredictedRow> = usable.filter_map(predicted).collect();
         let coefficients = 0..slow.coefficients;
         let of = |one: &PredictedRow| {
@@ -79,13 +92,10 @@ impl<'a, 'b> PredictedRows<'a, 'b> {
     /// Mean squared error of predicting them, over the noise's variance: slow coefficients from equations without the row, windowed ones from windows
     /// on both sides of it. The angle's noise in a row grows with the coefficients: each square counts as if that were the expected noise, or
     /// the smallest coefficients would predict best. More than twice that noise excuses no error.
-    ///
-    /// Where what is left is far more than noise, it may be that curves without the equations near a row cannot follow what moves quickly: if they are to be,
-    /// those with all of them are compared there, and all of these are worse than what predicts with noise alone.
     pub(crate) fn error(
         &self,
         [leave_gap_out, full]: &[Varying; 2],
-        compared: Option<PredictedBy>,
+        ways: &[PredictedBy],
         expected: Expected,
     ) -> Prediction {
         let &Self { problem, slow, .. } = self;
@@ -118,22 +128,22 @@ impl<'a, 'b> PredictedRows<'a, 'b> {
         }
         let count = self.rows.len() as f64;
         if count == 0.0 {
-            return Prediction { error: f64::INFINITY, excess: 0.0 };
+            return Prediction { error: f64::INFINITY, by_all: None, excess: 0.0 };
         }
         let mean = |squares: &[f64]| {
             let most = LargestSquare::Growing.of(squares.iter().copied(), MOST);
             squares.iter().map(|square| square.min(most)).sum::<f64>() / count
         };
         let error = mean(&squares);
-        let is_lost = error > USUAL && compared == Some(PredictedBy::AllEquations);
-        if is_lost {
+        let by_all = (error > USUAL && ways.contains(&PredictedBy::AllEquations)).then(|| {
             squares.clear();
             for of_row in self.rows.iter().zip(self.taken.chunks(coefficients)) {
                 let left = self.left(of_row, (full, full), &mut constants[1], &mut locals);
                 squares.push(left * left / expected.variance);
             }
-        }
-        Prediction { error: if is_lost { USUAL + mean(&squares) } else { error }, excess: excess / count }
+            USUAL + mean(&squares)
+        });
+        Prediction { error, by_all, excess: excess / count }
     }
 
     /// The constants beside a curve, after places for its coefficients at a row.
@@ -243,7 +253,8 @@ mod tests {
         let companions = vec![rows.regressors[1].companion.as_slice()];
         let slow = Slow { fit: &fit, coefficients: 1, companions, current, weights: &weights, rows: ROWS, breaks: &[] };
         let curves = curves.map(Varying::clone);
-        PredictedRows::new(&slow, &problem, scale).error(&curves, Some(PredictedBy::OtherEquations), expected)
+        let rows = PredictedRows::new(&slow, &problem, (scale, Compare::Most));
+        rows.error(&curves, &[PredictedBy::OtherEquations], expected)
     }
 
     #[test]

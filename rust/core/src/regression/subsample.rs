@@ -50,6 +50,7 @@ pub(crate) fn thinned_rows(rows: &Rows, stretches: &[Range<usize>]) -> Rows {
 const LONG: usize = 1 << 15;
 const MOST_ROWS: usize = 1 << 14;
 const FEW_ROWS: usize = 1 << 12;
+const SOME_ROWS: usize = 1 << 11;
 const PART: usize = 4;
 const STRETCHES: usize = 8;
 const MORE: usize = 4;
@@ -67,10 +68,22 @@ pub(crate) fn few_stretches(rows: usize, scales: &[Scale]) -> Option<(Vec<Range<
     (held > 1).then(|| (stretches_of_blocks(rows, few, STRETCHES), held))
 }
 
-/// Rows that compare what may change anywhere in a record: all of few, or one in each of at least [`MOST_ROWS`] equal parts of many.
-/// No period of the motion falls in with their places.
-pub(crate) fn rows_all_over(rows: usize) -> impl Iterator<Item = usize> {
-    let part = if rows <= LONG { 1 } else { rows / MOST_ROWS };
+/// Rows that compare what may change anywhere in a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Compare {
+    /// All of few, or one in each of at least [`MOST_ROWS`] equal parts of many.
+    Most,
+    /// One in each of at least [`SOME_ROWS`] equal parts, where that comes near enough.
+    Some,
+}
+
+/// Those rows. No period of the motion falls in with their places.
+pub(crate) fn rows_all_over(rows: usize, compare: Compare) -> impl Iterator<Item = usize> {
+    let part = match compare {
+        Compare::Most if rows <= LONG => 1,
+        Compare::Most => rows / MOST_ROWS,
+        Compare::Some => (rows / SOME_ROWS).max(1),
+    };
     let of_part = move |index: usize| {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within a part")]
         let within = ((index as f64 * GOLDEN).fract() * part as f64) as usize;
@@ -131,10 +144,21 @@ mod tests {
     use super::*;
 
     #[test]
+    fn some_rows_come_near_all_over_what_all_would() {
+        assert!(rows_all_over(SOME_ROWS, Compare::Some).eq(0..SOME_ROWS));
+        for rows in [2 * SOME_ROWS, LONG, 700_001] {
+            let found: Vec<usize> = rows_all_over(rows, Compare::Some).collect();
+            let part = rows / SOME_ROWS;
+            assert!((SOME_ROWS..SOME_ROWS + SOME_ROWS / part).contains(&found.len()) && part > 1);
+            assert!(found.iter().enumerate().all(|(index, row)| row / part == index));
+        }
+    }
+
+    #[test]
     fn few_rows_compare_all_over_what_many_would() {
-        assert!(rows_all_over(LONG).eq(0..LONG));
+        assert!(rows_all_over(LONG, Compare::Most).eq(0..LONG));
         for rows in [LONG + 1, 700_001] {
-            let found: Vec<usize> = rows_all_over(rows).collect();
+            let found: Vec<usize> = rows_all_over(rows, Compare::Most).collect();
             let part = rows / MOST_ROWS;
             assert!((MOST_ROWS..MOST_ROWS + MOST_ROWS / part).contains(&found.len()));
             assert!(found.iter().enumerate().all(|(index, row)| row / part == index));
