@@ -187,9 +187,11 @@ impl Session<'_, '_, '_> {
             let worst = self.test(rows, &mut decided)?;
             let asked = changing.next();
             let is_lost = asked.is_none() && !model.windowed.is_empty() && decided.is_lost();
+            // Constants that were set free together for nothing in this round.
+            let mut in_vain = Vec::new();
             let may_vary = self.most_slow.is_none_or(|most| decided.slow.len() < most);
             if worst.is_some() && is_lost && may_vary {
-                is_free = self.set_contradicted_free(rows, &model, &mut decided)?;
+                is_free = self.set_contradicted_free(rows, &model, &mut decided, &mut in_vain)?;
                 if is_free {
                     continue;
                 }
@@ -204,7 +206,7 @@ impl Session<'_, '_, '_> {
                     (model, decided) = (Cow::Owned(free.model.clone()), free);
                     continue;
                 }
-                is_free = self.set_unsteady_free(rows, &model, &mut decided)?;
+                is_free = self.set_unsteady_free(rows, &model, &mut decided, in_vain)?;
                 if is_free {
                     continue;
                 }

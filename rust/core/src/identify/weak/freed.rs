@@ -8,6 +8,7 @@ use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decide::{BADLY, BETTER};
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
+use crate::identify::weak::swings::HOPELESS;
 use crate::inference::constancy::Test;
 use crate::inference::part_constants::TestNoise;
 use crate::inference::short_parts::{MORE_THAN_NOISE, Swinging, swinging};
@@ -27,18 +28,22 @@ pub(crate) const A_LITTLE_BETTER: f64 = 0.9;
 /// As `LEFT_OF_SWINGS`, in windows beside constants alone: what makes a stiffness or a damping of a spring that hardens or a drag leaves .21 and more.
 const LEFT_IN_WINDOWS: f64 = 0.15;
 
+/// Of what several constants together leave, one of them may seem to leave less by this factor: their curves differ.
+pub(crate) const NO_LESS: f64 = 1.5;
+
 /// Where constants jump, those that do not change in between stand unless others predict so much better.
 const SIMPLER: f64 = 0.98;
 
 impl Session<'_, '_, '_> {
     /// Sets the constant free that seems to grow most where rows are predicted badly, if that leaves far less, or else the one that swings most, if that
     /// leaves hardly more than noise: whatever is missing from an equation follows a curve a little. Returns whether it was. One that was given as
-    /// constant is contradicted.
+    /// constant is contradicted. What was set free in vain is not tried again.
     pub(crate) fn set_unsteady_free(
         &mut self,
         rows: &Rows,
         model: &Model,
         decided: &mut Decided,
+        mut in_vain: Vec<Vec<usize>>,
     ) -> Result<bool, Error> {
         let Some(fit) = decided.fit.as_ref().filter(|fit| fit.scale.is_some()) else { return Ok(false) };
         if !decided.slow.is_empty() {
@@ -48,49 +53,60 @@ impl Session<'_, '_, '_> {
         let swinging = self.swinging(rows, decided)?;
         decided.longest = swinging.as_ref().and_then(|one| one.longest);
         if let Some(growing) = growing {
-            let free = self.freed(rows, model, decided, (&[growing], f64::INFINITY))?;
+            let free = self.freed(rows, model, decided, (&[growing], hopeless(decided)))?;
             let most = if decided.error < NOISE_MODEL_FAILS { FAR_BETTER } else { EXPLAINED };
             if free.error < most * decided.error {
                 *decided = free;
                 return Ok(true);
             }
+            if decided.is_lost() {
+                in_vain.push(vec![growing]);
+            }
         }
         match swinging {
-            Some(swinging) => self.set_swinging_free(rows, model, decided, swinging),
+            Some(swinging) => self.set_swinging_free(rows, model, decided, (swinging, &in_vain)),
             None => Ok(false),
         }
     }
 
     /// Sets constants free that parts of the record contradict where hardly a row is within the noise: there parts differ by whatever is missing from the
     /// equation, and only a constant that explains most of that changes. The one is set free that leaves least, or all of them together, for two that
-    /// change hide each other. Returns whether one was.
+    /// change hide each other. Where all of them explain next to nothing, one of them explains no more. Returns whether one was, and adds those that were
+    /// tried in vain.
     pub(crate) fn set_contradicted_free(
         &mut self,
         rows: &Rows,
         model: &Model,
         decided: &mut Decided,
+        in_vain: &mut Vec<Vec<usize>>,
     ) -> Result<bool, Error> {
         let contradicted = self.contradicted(decided);
         if decided.found.is_none() {
             decided.longest = self.swinging(rows, decided)?.and_then(|one| one.longest);
         }
-        let alone: Vec<&[usize]> = contradicted.chunks(1).collect();
         let may = self.most_slow.is_none_or(|most| decided.slow.len() + contradicted.len() <= most);
         let all = (may && contradicted.len() > 1).then_some(contradicted.as_slice());
-        for together in [alone, all.into_iter().collect()] {
-            let mut best: Option<Decided> = None;
-            for constants in together {
-                let free = self.freed(rows, model, decided, (constants, f64::INFINITY))?;
-                best = best.filter(|best| best.error.total_cmp(&free.error).is_le()).or(Some(free));
-                if best.as_ref().is_some_and(|best| best.error < BADLY) {
-                    break;
-                }
-            }
-            if let Some(best) = best.filter(|best| best.error < EXPLAINED * decided.error) {
-                *decided = best;
-                return Ok(true);
+        let most = EXPLAINED * decided.error;
+        let all_free = all.map(|all| self.freed(rows, model, decided, (all, hopeless(decided)))).transpose()?;
+        let mut best: Option<Decided> = None;
+        // Swings must leave less than what is asked here.
+        if let Some(all) = all.filter(|_| all_free.as_ref().is_some_and(|free| free.error >= NO_LESS * most)) {
+            in_vain.push(all.to_vec());
+            return Ok(false);
+        }
+        for constants in contradicted.chunks(1) {
+            let free = self.freed(rows, model, decided, (constants, hopeless(decided)))?;
+            best = best.filter(|best| best.error.total_cmp(&free.error).is_le()).or(Some(free));
+            if best.as_ref().is_some_and(|best| best.error < BADLY) {
+                break;
             }
         }
+        let explains = |free: &Decided| free.error < most;
+        if let Some(free) = best.filter(explains).or(all_free.filter(explains)) {
+            *decided = free;
+            return Ok(true);
+        }
+        in_vain.extend(contradicted.chunks(1).chain(all).map(<[usize]>::to_vec));
         Ok(false)
     }
 
@@ -278,6 +294,11 @@ impl Session<'_, '_, '_> {
         }
         Ok(())
     }
+}
+
+/// The error after the first round of a search from which on it is not worth another: only where constants must explain most of what is left.
+fn hopeless(decided: &Decided) -> f64 {
+    if decided.is_lost() { HOPELESS * decided.error } else { f64::INFINITY }
 }
 
 /// Rows in which the rate of a coefficient that was given as constant, for which they have no column, makes nothing: good enough to tell whether it

@@ -6,7 +6,7 @@ use std::ops::Range;
 use crate::equation::rows::Rows;
 use crate::error::Error;
 use crate::identify::weak::decided::Decided;
-use crate::identify::weak::freed::{A_LITTLE_BETTER, without_rate};
+use crate::identify::weak::freed::{A_LITTLE_BETTER, NO_LESS, without_rate};
 use crate::identify::weak::session::Session;
 use crate::inference::cross_validation::best_length;
 use crate::inference::short_parts::{LEFT_OF_SWINGS, LEFT_WHERE_LOST, Swinging, swinging};
@@ -17,26 +17,40 @@ use crate::regression::subsample::{holds, places_of, stretches_of_rows, thinned_
 use crate::regression::window_length::Scale;
 
 /// The part that is left after the first round of a search, from which on it is not worth another.
-const HOPELESS: f64 = 0.5;
+pub(crate) const HOPELESS: f64 = 0.5;
 
 impl Session<'_, '_, '_> {
     /// Sets a constant free that swings, if that leaves hardly more than noise: whatever is missing from an equation follows a curve a little. Where rows
     /// are predicted worst it is set free with all others, too: two that swing hide each other. Returns whether it was. One that was given as constant is
-    /// contradicted.
+    /// contradicted. What was set free in vain is not tried again.
     pub(crate) fn set_swinging_free(
         &mut self,
         rows: &Rows,
         model: &Model,
         decided: &mut Decided,
-        Swinging { constant, test, .. }: Swinging,
+        (Swinging { constant, test, .. }, in_vain): (Swinging, &[Vec<usize>]),
     ) -> Result<bool, Error> {
         let swinging = decided.model.constant[constant];
         let undecided = self.undecided();
         let is_open = undecided.contains(&swinging);
         let rows = if is_open { Cow::Borrowed(rows) } else { Cow::Owned(without_rate(rows, swinging)) };
-        let mut explained = self.swinging_explained(&rows, model, decided, &[swinging])?;
-        if explained.is_none() && is_open && undecided.len() > 1 && decided.is_lost() {
-            explained = self.swinging_explained(&rows, model, decided, &undecided)?;
+        let is_tried =
+            |constants: &[usize]| in_vain.iter().any(|tried| constants.iter().all(|one| tried.contains(one)));
+        let mut explained = None;
+        if is_open && undecided.len() > 1 && decided.is_lost() {
+            if is_tried(&undecided) {
+                return Ok(false);
+            }
+            // Where all leave too much, one of them does.
+            let Some(free) = self.swinging_freed(&rows, model, decided, &undecided)? else { return Ok(false) };
+            if !leaves_little(decided, &free, NO_LESS) {
+                return Ok(false);
+            }
+            explained = Some(free).filter(|free| is_explained(decided, free));
+        }
+        if !is_tried(&[swinging]) {
+            let free = self.swinging_freed(&rows, model, decided, &[swinging])?;
+            explained = free.filter(|free| is_explained(decided, free)).or(explained);
         }
         let Some(free) = explained else { return Ok(false) };
         if is_open {
@@ -56,8 +70,8 @@ impl Session<'_, '_, '_> {
         Ok(swinging(&problem, (fit, &may), noise, instructions, &mut self.stages)?.into_iter().next())
     }
 
-    /// What a record is with some constants set free, if that leaves hardly more than noise.
-    fn swinging_explained(
+    /// What a record is with some constants set free, if that is worth following along all of it.
+    fn swinging_freed(
         &mut self,
         rows: &Rows,
         model: &Model,
@@ -68,10 +82,7 @@ impl Session<'_, '_, '_> {
             return Ok(None);
         }
         let excess = (decided.error - 1.0).max(0.0);
-        let free = self.freed(rows, model, decided, (constants, 1.0 + HOPELESS * excess))?;
-        let most = if decided.is_lost() { LEFT_WHERE_LOST } else { LEFT_OF_SWINGS };
-        let is_explained = free.error - 1.0 < most * excess && free.error < A_LITTLE_BETTER * decided.error;
-        Ok(Some(free).filter(|free| is_explained && (!decided.is_lost() || is_of_a_machine(free))))
+        Ok(Some(self.freed(rows, model, decided, (constants, 1.0 + HOPELESS * excess))?))
     }
 
     /// Whether stretches of a long record say that it is not worth following some constants along all of it: even a curve of its own in each leaves too much
@@ -115,6 +126,18 @@ impl Session<'_, '_, '_> {
         }
         Ok(true)
     }
+}
+
+/// Whether what was set free explains what constants leave.
+fn is_explained(decided: &Decided, free: &Decided) -> bool {
+    leaves_little(decided, free, 1.0) && (!decided.is_lost() || is_of_a_machine(free))
+}
+
+/// Whether it leaves hardly more than noise, or no more than so many times what may be left.
+fn leaves_little(decided: &Decided, free: &Decided, times: f64) -> bool {
+    let most = if decided.is_lost() { LEFT_WHERE_LOST } else { LEFT_OF_SWINGS };
+    let excess = (decided.error - 1.0).max(0.0);
+    free.error - 1.0 < times * most * excess && free.error < A_LITTLE_BETTER * decided.error
 }
 
 /// Whether what varies slowly is positive on average, as inertia and damping are: in bursts of one frequency a torque that is late is followed by curves of
