@@ -6,6 +6,7 @@ import math
 
 from tvident._live.counts import NO_MISTAKE, ClockCounts
 from tvident._live.rate import HALF, LONGEST_BUFFER, MOVES, Buffers, Came, Lateness, Rate, RateLook, Row
+from tvident._live.waiting import Waiting
 
 _WAIT = 16
 """Samples that decide whether a stamp was late or early alone, or samples were lost or repeated before it; buffers, where samples come
@@ -13,9 +14,6 @@ in buffers whose stamps are late or early together."""
 
 _LONGEST_WAIT = 2.0
 """Seconds that samples wait for buffers that decide, at most."""
-
-_AGREE = 8
-"""Buffers that agree on what was lost before them."""
 
 _COARSE = 1.005
 """Periods from stamp to stamp, at least, where their last digit is longer than a period."""
@@ -57,9 +55,7 @@ class LiveClock(ClockCounts):
         """Until the first samples say at which rate they come."""
         self._looked = period
         """The period that they say."""
-        self._waiting: list[Came] = []
-        self._earliest, self._latest_off = math.inf, -math.inf
-        """Periods by which those that wait are late: of the one that is least late, and most."""
+        self._waiting = Waiting()
         self._buffers = Buffers(max(1, int(LONGEST_BUFFER / period)))
         self._lateness = Lateness()
         self._earlier = (math.nan, 0)
@@ -143,13 +139,13 @@ class LiveClock(ClockCounts):
         self.back += step <= -HALF and length == 1
         far = -max(_WAIT, 2 * length, _SET_BACK / self._period)
         # A stamp that comes after a wrong one is where it was due.
-        if step < far and not self._off(row, len(self._waiting)) > far:
+        if step < far and not self._off(row, len(self._waiting.came)) > far:
             # Nothing before it says when this one is due.
             return [*self._settled_at_last(), *self._jumped(row[0]), self._taken(Came(row))]
         came = Came(row, tells, self._buffers.begins)
-        if not self._waiting and not (tells and abs(self._off(row, 0)) >= HALF):
+        if not self._waiting.came and not (tells and abs(self._off(row, 0)) >= HALF):
             return [self._taken(came)]
-        self._wait(came)
+        self._waiting.add(came, self._off(row, len(self._waiting.came)))
         return self._decided()
 
     def _decided(self) -> list[Row]:
@@ -157,24 +153,24 @@ class LiveClock(ClockCounts):
         most = max(_WAIT, int(_LONGEST_WAIT / self._period))
         length = self._buffers.length
         enough = min(_WAIT * length, most)
-        if self._is_due():
+        if self._waiting.is_due:
             return self._settled()
-        if not self._have_waited(enough) and len(self._waiting) <= most:
+        if not self._have_waited(enough) and len(self._waiting.came) <= most:
             return []
-        found = self._taken_first(self._late_alone())
+        found = self._taken_first(self._waiting.late_alone(self._buffers.length, self._lateness))
         is_decided = self._is_no_chance() and self._have_waited(enough)
-        return [*found, *self._settled()] if is_decided or len(self._waiting) > most else found
+        return [*found, *self._settled()] if is_decided or len(self._waiting.came) > most else found
 
     def _have_waited(self, enough: int) -> bool:
         """Return whether so many wait, and 16 of them have stamps of their own."""
-        return len(self._waiting) > enough and sum(came.tells for came in self._waiting) > _WAIT
+        return len(self._waiting.came) > enough and self._waiting.telling > _WAIT
 
     def _is_no_chance(self) -> bool:
         """Return whether those that wait are not all late, or early, by chance: single samples are not, if 16 are."""
         length = self._buffers.length
-        if length == 1 or self._earliest < 0:
+        if length == 1 or self._waiting.earliest < 0:
             return True
-        return self._lateness.is_no_chance(self._earliest, len(self._waiting) / length)
+        return self._lateness.is_no_chance(self._waiting.earliest, len(self._waiting.came) / length)
 
     def rest(self) -> list[Row]:
         """Return what still waits, at the end: samples of one buffer say nothing of what was lost."""
@@ -185,13 +181,13 @@ class LiveClock(ClockCounts):
     def _settled_at_last(self) -> list[Row]:
         """Return what waits for stamps that do not come any more."""
         found: list[Row] = []
-        while self._waiting:
-            is_usual = 0 < self._earliest <= self._latest_off <= self._lateness.usual
-            is_one_buffer = self._waiting[-1].row[0] - self._waiting[0].row[0] < MOVES * self._seconds()
-            if is_usual or is_one_buffer or 1 < len(self._waiting) <= 2 * self._buffers.length:
-                found += self._taken_first(len(self._waiting))
+        while waiting := self._waiting.came:
+            is_usual = 0 < self._waiting.earliest <= self._waiting.latest <= self._lateness.usual
+            is_one_buffer = waiting[-1].row[0] - waiting[0].row[0] < MOVES * self._seconds()
+            if is_usual or is_one_buffer or 1 < len(waiting) <= 2 * self._buffers.length:
+                found += self._taken_first(len(waiting))
             else:
-                found += self._taken_first(self._late_alone())
+                found += self._taken_first(self._waiting.late_alone(self._buffers.length, self._lateness))
                 found += self._settled()
         return found
 
@@ -227,32 +223,15 @@ class LiveClock(ClockCounts):
         is_known = error * _WAIT * self._buffers.length < _ADDS_UP * self._period or differs > _SURE * error
         return shown if is_known else self._looked
 
-    def _offs(self) -> list[float]:
-        """Return by how many periods each sample that waits is late, NaN where its stamp tells nothing."""
-        return [self._off(came.row, place) if came.tells else math.nan for place, came in enumerate(self._waiting)]
-
-    def _wait(self, came: Came) -> None:
-        """Let a sample wait."""
-        self._see_off(self._off(came.row, len(self._waiting)) if came.tells else math.nan)
-        self._waiting.append(came)
-
-    def _see_off(self, off: float) -> None:
-        """Note how late the earliest and the latest of those that wait are."""
-        if math.isfinite(off):
-            self._earliest, self._latest_off = min(self._earliest, off), max(self._latest_off, off)
-
-    def _is_due(self) -> bool:
-        """Return whether nothing was lost or repeated before those that wait: one of them is not off, or some are late and some early."""
-        return self._earliest < HALF and self._latest_off > -HALF
-
     def _settled(self) -> list[Row]:
         """Return what waits up to the last sample that is not off, or all of it, after what was lost before it."""
         found: list[Row] = []
         off = 0.0
-        if math.isfinite(self._earliest) and not self._is_due() and self._is_no_chance():
-            off = min(self._earliest, self._latest_off, key=abs)
+        waiting = self._waiting
+        if math.isfinite(waiting.earliest) and not waiting.is_due and self._is_no_chance():
+            off = min(waiting.earliest, waiting.latest, key=abs)
         by = math.floor(off + HALF)
-        first = self._waiting[0]
+        first = waiting.came[0]
         if by > _MOST_LOST or (by > 0 and self._has_returned()):
             found += self._jumped(first.row[0])
         elif by < 0 and self._came <= 2 * self._buffers.latest:
@@ -267,34 +246,17 @@ class LiveClock(ClockCounts):
         elif by > 0:
             found += self._gap(by)
             self._leave_out_unsure()
-        due = [place for place, off in enumerate(self._offs()) if abs(off) < HALF]
-        return [*found, *self._taken_first(due[-1] + 1 if due else len(self._waiting))]
-
-    def _late_alone(self) -> int:
-        """Return how many of those that wait come before a loss: no later than others were before, while all that follow are later."""
-        offs = self._offs()
-        heads = [place for place, off in enumerate(offs) if math.isfinite(off)]
-        if not heads:
-            return 0
-        if self._buffers.length > 1:
-            heads = [place for place in heads if self._waiting[place].begins or place == heads[0]]
-        rest, least, most = self._latest_off, math.inf, 0.0
-        later = [rest := min(rest, offs[place]) for place in reversed(heads)][::-1]
-        # What the last of them agree on is what was lost before the first that is followed by none which is less late.
-        lost = math.floor(later[-min(_AGREE, len(heads))] + HALF) - MOVES
-        for count, head in enumerate(heads):
-            if later[count] >= lost:
-                return head if count else 0
-            least, most = min(least, offs[head]), max(most, offs[head])
-            if not HALF <= most <= self._lateness.usual or self._lateness.is_no_chance(least, count + 1):
-                return 0
-        return 0
+        offs = enumerate(
+            self._off(came.row, place) if came.tells else math.nan for place, came in enumerate(waiting.came)
+        )
+        due = [place for place, off in offs if abs(off) < HALF]
+        return [*found, *self._taken_first(due[-1] + 1 if due else len(waiting.came))]
 
     def _has_returned(self) -> bool:
         """Return whether those that wait have stamps of the clock as it was before it was set."""
         due, came = self._earlier
         due += (self._came - came) * self._seconds()
-        return abs(self._waiting[0].row[0] - due) < _SET_BACK
+        return abs(self._waiting.came[0].row[0] - due) < _SET_BACK
 
     def _leave_out_unsure(self) -> None:
         """Leave out the buffer before which samples were lost, for its stamps are counted back from when it was sent.
@@ -303,19 +265,20 @@ class LiveClock(ClockCounts):
         """
         if self._buffers.length == 1:
             return
-        for place, (row, tells, begins) in enumerate(self._waiting):
+        for place, (row, tells, begins) in enumerate(self._waiting.came):
             if begins and place:
                 break
             self.unsure += math.isfinite(row[1]) and math.isfinite(row[2])
-            self._waiting[place] = Came(_apart(row[0]), tells, begins)
+            self._waiting.came[place] = Came(_apart(row[0]), tells, begins)
 
     def _taken_first(self, count: int) -> list[Row]:
         """Take so many of those that wait."""
-        found = [self._taken(came) for came in self._waiting[:count]]
-        del self._waiting[:count]
-        self._earliest, self._latest_off = math.inf, -math.inf
-        for off in self._offs():
-            self._see_off(off)
+        if not count:
+            return []
+        (first, rest), self._waiting = self._waiting.parted(count), Waiting()
+        found = [self._taken(came) for came in first]
+        for place, came in enumerate(rest):
+            self._waiting.add(came, self._off(came.row, place))
         return found
 
     def _jumped(self, stamp: float) -> list[Row]:
