@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from tvident._live.counts import NO_MISTAKE, ClockCounts
+from tvident._live.changes import Looks, RateChange, Stretches
+from tvident._live.counts import NO_MISTAKE, WHOLE, ClockCounts
 from tvident._live.rate import HALF, LONGEST_BUFFER, MOVES, Buffers, Came, Lateness, Rate, RateLook, Row
 from tvident._live.waiting import Waiting
 
@@ -58,6 +59,7 @@ class LiveClock(ClockCounts):
         self._waiting = Waiting()
         self._buffers = Buffers(max(1, int(LONGEST_BUFFER / period)))
         self._lateness = Lateness()
+        self._looks, self._stretches = Looks(), Stretches()
         self._earlier = (math.nan, 0)
         """Of the clock before it was set: when a sample was due, and how many had come."""
         self._next = 0
@@ -143,10 +145,40 @@ class LiveClock(ClockCounts):
             # Nothing before it says when this one is due.
             return [*self._settled_at_last(), *self._jumped(row[0]), self._taken(Came(row))]
         came = Came(row, tells, self._buffers.begins)
-        if not self._waiting.came and not (tells and abs(self._off(row, 0)) >= HALF):
-            return [self._taken(came)]
+        found = self._changed(row[0]) if tells and (self._buffers.begins or length == 1) else []
+        if found or (not self._waiting.came and not (tells and abs(self._off(row, 0)) >= HALF)):
+            return [*found, self._taken(came)]
         self._waiting.add(came, self._off(row, len(self._waiting.came)))
         return self._decided()
+
+    def _changed(self, stamp: float) -> list[Row]:
+        """Return what waits if the latest samples show that another rate was taken for losses, of which there were none then."""
+        # Where samples show that the nominal rate is a mistake, none is judged by another.
+        if not math.isfinite(stamp) or self._other != self._period or self.rate.count < _WAIT:
+            return []
+        known = self._seconds()
+        period = self._looks.see(self._came + len(self._waiting.came), stamp, known, self.rate.scatter)
+        periods = period / self._period
+        if period == known or (periods > 1 + HALF and abs(periods - round(periods)) < WHOLE):
+            return []
+        begin, lost, repeated = self._looks.since(period)
+        if abs(period - self._period) >= NO_MISTAKE * self._period:
+            # What is taken for lost, or repeated, keeps windows from samples that are up to half a step from their times.
+            self._other = period
+            self.changes.append(RateChange(begin, known, period))
+            return []
+        self.lost -= lost
+        self.repeated -= repeated
+        self.mistaken += lost + repeated
+        found = self._taken_first(len(self._waiting.came))
+        self._note_change(RateChange(begin, known, period), Rate())
+        self._stretches, self._expected = Stretches(), stamp
+        return found
+
+    def _note_change(self, change: RateChange, rate: Rate) -> None:
+        """Go on with another rate."""
+        self.changes.append(change)
+        self.rate, self._lateness, self._looks, self._looked = rate, Lateness(), Looks(), change.after
 
     def _decided(self) -> list[Row]:
         """Return what is in order of those that wait, once they say what was lost before them."""
@@ -232,6 +264,8 @@ class LiveClock(ClockCounts):
             off = min(waiting.earliest, waiting.latest, key=abs)
         by = math.floor(off + HALF)
         first = waiting.came[0]
+        if by:
+            self._looks.took_for_lost(self._came, by)
         if by > _MOST_LOST or (by > 0 and self._has_returned()):
             found += self._jumped(first.row[0])
         elif by < 0 and self._came <= 2 * self._buffers.latest:
@@ -288,6 +322,7 @@ class LiveClock(ClockCounts):
         self._of_earlier_clock, self._other = self.repeated, self._period
         self._earlier, self._lateness = (self._expected, self._came), Lateness()
         self.rate, self._next, self._expected = Rate(), 0, stamp
+        self._looks, self._stretches = Looks(), Stretches()
         return [_apart(stamp)]
 
     def _gap(self, missing: int) -> list[Row]:
@@ -310,6 +345,8 @@ class LiveClock(ClockCounts):
             is_right = late <= _SET_BACK / self._seconds() and (late >= -HALF or late >= -self._lateness.usual)
             if is_right and came.tells and (came.begins or self._buffers.length == 1):
                 self.rate.see(self._next, row[0])
+                if (found := self._stretches.see(self._next, row[0])) is not None:
+                    self._note_change(*found)
                 self._follow(late, came)
         elif math.isfinite(self._expected):
             row = (self._expected, *row[1:])

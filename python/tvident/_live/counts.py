@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from tvident._live.rate import Rate
+from tvident._live.changes import RateChange
+from tvident._live.rate import SCATTER, Rate
 
 NO_MISTAKE = 0.1
 """How far a period may be from the nominal one without being a mistake."""
@@ -12,11 +13,14 @@ NO_MISTAKE = 0.1
 _ENOUGH, _MOST_REPEATED, _FASTER = 200, 0.1, 1.1
 """Stamps that say at which rate they come, the part of them that may come twice, and how much faster than nominal they may be then."""
 
-_WHOLE = 0.05
+WHOLE = 0.05
 """Periods by which a longer period is no whole number of them, at least, where no other samples can be missing."""
 
 _FEW = 32
 """Buffers, or samples, that say how far a rate is off, at least."""
+
+_CERTAIN = 3.0
+"""Standard errors by which a rate is off, at least, before what it hides is said."""
 
 _NOTABLE = 1e-3
 """Of the rate: inertia goes with its square."""
@@ -34,6 +38,10 @@ class ClockCounts:
     ----------
     rate : Rate
         Since the clock was set.
+    changes : list of RateChange
+        Of the rate while the session ran.
+    mistaken : int
+        Samples that were taken for lost, or repeated, until it showed that the rate had changed.
     lost, repeated, jumps, back, twice, empty, unsure : int
         Samples that did not come and that came twice or too late, how often clock or counter were set, stamps that are before the last
         one by half a period or more, samples that were left out since they came twice with their stamps, that came without a number, and
@@ -48,6 +56,8 @@ class ClockCounts:
         self._begin = self._newest = math.nan
         self._came = self._stamped = self._same = self._of_earlier_clock = 0
         self._has_buffers = False
+        self.changes: list[RateChange] = []
+        self.mistaken = 0
         self.lost = self.repeated = self.jumps = self.back = self.twice = self.empty = self.unsure = 0
 
     @property
@@ -67,7 +77,7 @@ class ClockCounts:
     def comes_slower(self) -> str:
         """What to say where stamps show a lower rate than the nominal one, by which samples seem to be lost; nothing elsewhere."""
         periods = self._other / self._period
-        if periods < 1 + NO_MISTAKE or abs(periods - round(periods)) < _WHOLE:
+        if periods < 1 + NO_MISTAKE or abs(periods - round(periods)) < WHOLE:
             return ""
         return self._must_be(f"{1 / self._other:.4g}", "samples are up to half a step from their times")
 
@@ -80,14 +90,37 @@ class ClockCounts:
         """What to say where the rate is not the nominal one by more than clocks are; nothing elsewhere."""
         period, error = self.rate.period, self.rate.error
         drift = self._period / period - 1 if period > 0 else math.nan
-        if not (self.rate.count >= _FEW and abs(drift) > max(_NOTABLE, 3 * error / period)):
+        if not (self.rate.count >= _FEW and abs(drift) > max(_NOTABLE, _CERTAIN * error / period)):
             return ""
-        return f"the rate differs by {100 * drift:+.2g} %: inertia is off by twice that; give --sample-rate {1 / period:.7g}"
+        said = f"the rate differs by {100 * drift:+.2g} %: inertia is off by twice that; give --sample-rate {1 / period:.7g}"
+        return f"{said}, unless {self.hidden} samples more are lost than are counted" if self.hidden else said
+
+    @property
+    def hidden(self) -> int:
+        """Samples that are lost beside those that are counted, if the rate is the nominal one: stamps are too late to tell which."""
+        rate = self.rate
+        if not (rate.count >= _FEW and rate.scatter > SCATTER * self._period):
+            return 0
+        slower = rate.period - self._period
+        return round(slower / self._period * (rate.last - rate.first)) if slower > _CERTAIN * rate.error else 0
+
+    @property
+    def changed(self) -> str:
+        """What to say where the rate changed while the session ran; nothing elsewhere."""
+        if not self.changes:
+            return ""
+        latest = self.changes[-1]
+        times = f", the last of {len(self.changes)} times," if len(self.changes) > 1 else ""
+        nominal = 1 / self._period
+        said = f"the rate changed{times} at {latest.stamp:.1f} s {latest}: inertia is off by twice what that is off {nominal:.6g} Hz"
+        if self.mistaken:
+            said += f"; {self.mistaken} samples were taken for lost or repeated until it showed"
+        return said
 
     @property
     def warning(self) -> str:
         """What must be said while the session runs."""
-        return self.comes_faster or self.comes_slower or self.differs
+        return self.comes_faster or self.comes_slower or self.changed or self.differs
 
     def words(self) -> list[str]:
         """Return what there is to say of the clock."""
@@ -113,12 +146,12 @@ class ClockCounts:
         if not (math.isfinite(period) and period > 0 and math.isfinite(error)):
             return [f"rate: {nominal:.6g} Hz nominal; no stamps to compare it with"]
         if other:
-            return [f"rate: {other}"]
+            return [f"rate: {other}", *([self.changed] if self.changed else [])]
         drift, of_drift = (self._period / period - 1) * 1e6, error / period * 1e6
         said = [
             f"rate: {nominal:.6g} Hz nominal, {1 / period:.7g} Hz effective; drift {drift:+.1f} ± {of_drift:.1f} ppm"
         ]
-        said += [self.differs] if self.differs else []
+        said += [one for one in (self.changed, self.differs) if one]
         return said
 
     def _loss_words(self) -> list[str]:
@@ -130,6 +163,11 @@ class ClockCounts:
         if self.comes_slower:
             return ["lost samples: not known at another rate than the nominal one"]
         said = [f"lost samples: {self.lost}"]
+        if self.hidden:
+            said.append(
+                f"stamps come {1000 * self.rate.scatter:.2g} ms late and early, so that samples lost one by one look like a slower "
+                f"clock: if its rate is the nominal one, {self.hidden} more are lost"
+            )
         if self.unsure:
             said.append(
                 f"{self.unsure} samples of buffers before which samples were lost are left out: they may be from before the loss"

@@ -9,6 +9,9 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
 
 Row = tuple[float, float, float]
 """Time, angle, torque."""
@@ -22,7 +25,7 @@ MOVES = 0.25
 _UNEVEN = 2e-3
 """Of a step from stamp to stamp, by how much it is no whole number of periods where another buffer begins."""
 
-_BUFFERS = 16
+BUFFERS_THAT_SAY = 16
 """Buffers that say how late buffers come."""
 
 LONGEST_BUFFER = 0.5
@@ -34,7 +37,7 @@ _LOOK, _LONGEST_LOOK = 64, 2.0
 _NO_CHANCE, _LATE = 14.0, 6.0
 """Mean latenesses that buffers in a row are late in all, at least, where that is no chance: one in a million; and that one may be."""
 
-_SCATTER = 0.3
+SCATTER = 0.3
 """Periods by which stamps scatter, at most, where lost samples can be told from another rate."""
 
 _FEW = 8
@@ -63,10 +66,13 @@ class Rate:
     squares: float = 0.0
     products: float = 0.0
     times: float = 0.0
+    first: float = math.nan
+    last: float = math.nan
 
     def see(self, number: float, time: float) -> None:
         """Add a sample."""
         self.count += 1
+        self.first, self.last = (number if self.count == 1 else self.first), number
         by, late = number - self.number, time - self.time
         self.number += by / self.count
         self.time += late / self.count
@@ -84,8 +90,13 @@ class Rate:
         """Standard error of the period, if stamps scatter independently."""
         if self.count < 3:  # noqa: PLR2004 - a line goes through two
             return math.nan
+        return self.scatter / math.sqrt(self.squares)
+
+    @property
+    def scatter(self) -> float:
+        """Seconds by which times are off the line, as a standard deviation; there must be three."""
         left = max(self.times - self.products**2 / self.squares, 0.0)
-        return math.sqrt(left / (self.count - 2) / self.squares)
+        return math.sqrt(left / (self.count - 2))
 
 
 @dataclass
@@ -153,15 +164,15 @@ class Lateness:
     wrong. Of a mean, by which lateness of a period or more would hide a sample that was lost, one buffer in three is half a period off.
     """
 
-    _latest: deque[float] = field(default_factory=lambda: deque(maxlen=_BUFFERS))
+    _latest: deque[float] = field(default_factory=lambda: deque(maxlen=BUFFERS_THAT_SAY))
 
     def see(self, late: float) -> float:
         """Take how late a buffer came, and return by how much later the next ones are due than was thought."""
         self._latest.append(late)
         first = sorted(self._latest)[:2][-1]
-        move = first if len(self._latest) == _BUFFERS or first < 0 else 0.0
+        move = first if len(self._latest) == BUFFERS_THAT_SAY or first < 0 else 0.0
         move = max(-HALF, min(HALF, move))
-        self._latest = deque((one - move for one in self._latest), maxlen=_BUFFERS)
+        self._latest = deque((one - move for one in self._latest), maxlen=BUFFERS_THAT_SAY)
         return move
 
     def note(self, late: float) -> None:
@@ -199,11 +210,27 @@ def shown_period(numbers: Sequence[int], stamps: Sequence[float], nominal: float
         if np.count_nonzero(is_usual) < max(_FEW, _MOST * len(numbers)):
             return nominal
         by, late = by[is_usual], late[is_usual]
-    count = len(by)
-    lost, losses = np.zeros(count), 0
+    lost, losses = np.zeros(len(by)), 0
     for place, off in enumerate((late[1:] - late[0]).tolist(), start=1):
         missing = max(0.0, math.floor(off - lost[place - 1] + HALF))
         lost[place], losses = lost[place - 1] + missing, losses + bool(missing)
+    return another_period(by, late, (lost, losses), nominal)
+
+
+def another_period(by: Floats, late: Floats, explained: tuple[Floats, int], nominal: float) -> float:
+    """Return the period of samples that are so late, in periods, if a line explains that better than losses do; else the nominal one.
+
+    Parameters
+    ----------
+    by, late : ndarray
+        Numbers of samples from the first on, and by how many periods each is late.
+    explained : tuple
+        What losses explain of that, and how many there are.
+    nominal : float
+        The period.
+    """
+    lost, losses = explained
+    count = len(by)
     from_middle = by - by.mean()
     squares = float(from_middle @ from_middle)
     slope = float(from_middle @ late) / squares
@@ -219,7 +246,7 @@ def shown_period(numbers: Sequence[int], stamps: Sequence[float], nominal: float
     usual = float(np.median(np.diff(late) / np.diff(by)))
     adds_up &= abs(usual - slope) < HALF * abs(slope)
     is_likelier = odds[0] + _CLEARLY < odds[1]
-    return nominal * (1 + slope) if adds_up and is_likelier and of_line < _SCATTER**2 else nominal
+    return nominal * (1 + slope) if adds_up and is_likelier and of_line < SCATTER**2 else nominal
 
 
 class RateLook:
@@ -249,7 +276,7 @@ class RateLook:
             self._begun.append(len(self.rows))
         self.rows.append(row)
         is_even = len(self._begun) == 1 and len(self.rows) > self._longest + _LOOK
-        has_enough = len(self._begun) >= _BUFFERS and len(self.rows) >= _LOOK
+        has_enough = len(self._begun) >= BUFFERS_THAT_SAY and len(self.rows) >= _LOOK
         return not math.isfinite(row[0]) or is_even or has_enough or len(self.rows) >= self._most
 
     @property
