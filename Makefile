@@ -162,6 +162,10 @@ wheels: $(WHEELS)/.ready  ## what is published, in dist/: sources, and from them
 bench: $(BENCH_BUILT)  ## how fast it is beside its peers: BENCH_OPTIONS="--quick", "--only identify", "--store", "--help"
 	PYTHONPATH=benches:tests $(BENCH)/$(PROGRAMS)/python -m speed $(BENCH_OPTIONS)
 
+.PHONY: bench-samples
+bench-samples:  ## one sample at a time through streams of the core: fails where one takes more than 3 µs on average
+	cargo run --release --quiet --package tvident-instructions -- one-at-a-time
+
 .PHONY: record-instructions
 record-instructions: $(READY)  ## write down the instructions that a window costs, for the tests to compare with (needs valgrind)
 	$(BIN)/python benches/instruction_counts.py

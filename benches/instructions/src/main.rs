@@ -1,8 +1,11 @@
 //! Runs one workload of the core on a record of one or two lengths and says how many windows that was, so that the difference of two
 //! counts of instructions is what windows cost, without the program's start and the tables of the plan.
 //!
+//! `one-at-a-time` times single samples through streams instead, with the fastest instructions.
+//!
 //! The record is a short stretch repeated, and outputs are fresh zeros: neither costs instructions that grow with the windows.
 
+mod one_at_a_time;
 mod workloads;
 
 use std::process::ExitCode;
@@ -21,8 +24,13 @@ fn main() -> ExitCode {
             }
             ExitCode::SUCCESS
         }
+        ["one-at-a-time"] => match one_at_a_time::measure() {
+            Ok(true) => ExitCode::SUCCESS,
+            Ok(false) => fail("a sample takes more than it may"),
+            Err(error) => fail(&error.to_string()),
+        },
         [name, lengths @ ("1" | "2")] => run(name, if lengths == "1" { 1 } else { 2 }),
-        _ => fail("usage: tvident-instructions list | NAME 1 | NAME 2"),
+        _ => fail("usage: tvident-instructions list | one-at-a-time | NAME 1 | NAME 2"),
     }
 }
 

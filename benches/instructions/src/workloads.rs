@@ -32,14 +32,14 @@ const CHOICE: Order = Order::Chosen { criterion: Criterion::Aicc, highest: 15 };
 const WINDOWS: usize = 1 << 15;
 
 /// A stretch of samples that goes on and on.
-struct Repeated {
+pub(crate) struct Repeated {
     stretch: Vec<f64>,
     len: usize,
 }
 
 impl Repeated {
     /// Two waves and noise, different for every channel.
-    fn new(channel: u32, len: usize) -> Self {
+    pub(crate) fn new(channel: u32, len: usize) -> Self {
         let mut state = 0x9E37_79B9_u32.wrapping_mul(channel + 1);
         let mut noise = || {
             state ^= state << 13;
@@ -149,18 +149,23 @@ fn least_squares(lengths: usize) -> Result<usize, Error> {
     Ok(windows)
 }
 
-fn identify(lengths: usize) -> Result<usize, Error> {
-    let instructions = Instructions::current();
-    let derivatives = LocalPolynomials::new(PolynomialOptions {
+/// Value and two derivatives in windows of 201 samples, with the order chosen, and the noise if it is wanted.
+pub(crate) fn choice_of_201(noise: bool) -> Result<LocalPolynomials, Error> {
+    LocalPolynomials::new(PolynomialOptions {
         window_length: 201,
         order: CHOICE,
         selection: Selection::Window,
         derivatives: vec![0, 1, 2],
         delta: 1e-3,
-        noise: true,
+        noise,
         quantisation: 0.0,
-        instructions,
-    })?;
+        instructions: Instructions::current(),
+    })
+}
+
+fn identify(lengths: usize) -> Result<usize, Error> {
+    let instructions = Instructions::current();
+    let derivatives = choice_of_201(true)?;
     let windows = lengths * WINDOWS.next_multiple_of(derivatives.stride());
     let (angle, torque) = (Repeated::new(0, windows), Repeated::new(1, windows));
     let motion = Motion {
