@@ -12,28 +12,19 @@ import pytest
 from click.testing import CliRunner
 
 import tvident
-from in_pieces.small_pieces import cut_small
 from parameters import long
 from tvident import Status
 from tvident._command_line import main
 from tvident._files import copy_text
 from tvident._in_pieces import copied as copied_module
 
+pytestmark = pytest.mark.usefixtures("small_pieces")
+
 SAMPLES = 70_001
 """Four pieces of the tests, the last of another length."""
 MOST_DIFFERENCE = 1.0
 """Of a standard error. Neighbours count twice in the short pieces of these tests, and windows are chosen from parts. An estimate with
 twice the variance of a better one differs from it by one of its errors: the variance of a difference is that of the variances."""
-
-
-@pytest.fixture(autouse=True)
-def _small_pieces(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    cut_small(monkeypatch, tmp_path)
-
-
-@pytest.fixture(scope="module")
-def rig() -> tvident.Recording:
-    return tvident.simulate_torsional_rig(duration=SAMPLES / 1000, sample_rate=1000, seed=5, pattern="slider")
 
 
 def columns_of(path: Path | str) -> dict[str, npt.NDArray[Any]]:

@@ -12,21 +12,12 @@ import pytest
 from scipy.io import netcdf_file
 
 import tvident
-from in_pieces.small_pieces import cut_small
 from tvident import recordings
+
+pytestmark = pytest.mark.usefixtures("small_pieces")
 
 SAMPLES = 30_001
 SCALE, FILL = 1e-4, np.int32(-(2**31))
-
-
-@pytest.fixture(autouse=True)
-def _small_pieces(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    cut_small(monkeypatch, tmp_path)
-
-
-@pytest.fixture(scope="module")
-def rig() -> tvident.Recording:
-    return tvident.simulate_torsional_rig(duration=SAMPLES / 1000, sample_rate=1000, seed=5, pattern="slider")
 
 
 def channels_of(rig: tvident.Recording) -> dict[str, tuple[npt.NDArray[Any], tuple[str, ...], dict[str, Any]]]:

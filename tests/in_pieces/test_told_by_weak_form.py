@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import h5py
@@ -12,7 +11,6 @@ import numpy.typing as npt
 import pytest
 
 import tvident
-from in_pieces.small_pieces import cut_small
 from parameters import long
 from tvident._in_pieces import told_by_weak_form
 
@@ -22,8 +20,7 @@ CONSTANT: Any = dict.fromkeys(("inertia", "damping", "stiffness"), "constant")
 
 
 @pytest.fixture(autouse=True)
-def _small_pieces(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    cut_small(monkeypatch, tmp_path)
+def _short_stretches(small_pieces: None, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: ARG001 - for what it does
     monkeypatch.setattr(told_by_weak_form, "_STRETCH", 10_000)
 
 
