@@ -38,6 +38,18 @@ pub fn part_of<'a>(
     }
 }
 
+/// Which part of all work each piece is, one after the other, and all of it.
+pub(crate) fn parts(lengths: impl Iterator<Item = usize>) -> (Vec<Range<usize>>, usize) {
+    let mut whole = 0;
+    let part = |length| {
+        let start = whole;
+        whole += length;
+        start..whole
+    };
+    let parts = lengths.map(part).collect();
+    (parts, whole)
+}
+
 /// How many threads a request means: itself, or all processors that this process may use.
 #[must_use]
 pub fn workers(request: Option<NonZeroUsize>) -> NonZeroUsize {
@@ -326,6 +338,12 @@ mod tests {
             assert_eq!(sum.into_inner(), 999 * 1000 / 2);
             assert_eq!(last, (1000, 1000));
         }
+    }
+
+    #[test]
+    fn parts_follow_one_another() {
+        assert_eq!(parts([3, 0, 4].into_iter()), (vec![0..3, 3..3, 3..7], 7));
+        assert_eq!(parts([].into_iter()), (Vec::new(), 0));
     }
 
     #[test]

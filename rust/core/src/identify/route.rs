@@ -6,7 +6,7 @@
 use std::num::NonZeroUsize;
 
 use crate::error::Error;
-use crate::exec::pool::{Watch, part_of};
+use crate::exec::pool::{Watch, part_of, parts};
 use crate::identify::form::{regressors, strong, weak};
 use crate::identify::identification::Identification;
 use crate::identify::kinds::{Kind, in_strong_form};
@@ -73,15 +73,10 @@ pub fn identify_all(
             }
         }
     }
-    let samples: usize = tasks.iter().map(|task| task.motion.angle.len()).sum();
-    let mut done = 0;
-    let rest = tasks.iter().zip(found).map(|(task, found)| {
-        let part = done..done + task.motion.angle.len();
-        done = part.end;
-        match found {
-            Some(found) => Ok(found),
-            None => alone(task, options, workers, &mut part_of(watch, part, samples)),
-        }
+    let (parts, samples) = parts(tasks.iter().map(|task| task.motion.angle.len()));
+    let rest = tasks.iter().zip(found).zip(parts).map(|((task, found), part)| match found {
+        Some(found) => Ok(found),
+        None => alone(task, options, workers, &mut part_of(watch, part, samples)),
     });
     rest.collect()
 }

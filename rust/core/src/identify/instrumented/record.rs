@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 
 use crate::equation::motion::{Motion, unknowns};
 use crate::error::Error;
-use crate::exec::pool::{Watch, part_of};
+use crate::exec::pool::{Watch, part_of, parts};
 use crate::identify::identification::{Covariance, Identification, Unknown};
 use crate::identify::instrumented::constancy::tests;
 use crate::identify::instrumented::explained::explained;
@@ -51,13 +51,11 @@ pub fn identify_with_instruments(
     workers: NonZeroUsize,
     watch: &mut Watch<'_>,
 ) -> Result<Vec<(Identification, InstrumentTest)>, Error> {
-    let samples: usize = tasks.iter().map(|(task, _)| task.motion.angle.len()).sum();
-    let mut done = 0;
-    let each = tasks.iter().map(|(task, instrument)| {
-        let part = done..done + task.motion.angle.len();
-        done = part.end;
-        one(task, *instrument, options, workers, &mut part_of(watch, part, samples))
-    });
+    let (parts, samples) = parts(tasks.iter().map(|(task, _)| task.motion.angle.len()));
+    let each = tasks
+        .iter()
+        .zip(parts)
+        .map(|((task, instrument), part)| one(task, *instrument, options, workers, &mut part_of(watch, part, samples)));
     each.collect()
 }
 
