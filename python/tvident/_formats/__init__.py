@@ -6,14 +6,18 @@ from typing import TYPE_CHECKING, Any
 from tvident._formats.known import FOLDERS, FORMATS, PROCESS, Format
 
 if TYPE_CHECKING:
+    from tvident._formats.hdf5 import hdf5_rate
     from tvident._formats.netcdf import (
         NetcdfMeaning,
         is_netcdf_3,
+        netcdf_3_rate,
+        netcdf_4_rate,
         netcdf_columns,
         netcdf_meaning,
         numbers_of_netcdf_3,
         numbers_of_netcdf_4,
     )
+    from tvident._formats.zarr_arrays import zarr_rate
 
 __all__ = [
     "FOLDERS",
@@ -21,16 +25,22 @@ __all__ = [
     "PROCESS",
     "Format",
     "NetcdfMeaning",
+    "hdf5_rate",
     "is_netcdf_3",
+    "netcdf_3_rate",
+    "netcdf_4_rate",
     "netcdf_columns",
     "netcdf_meaning",
     "numbers_of_netcdf_3",
     "numbers_of_netcdf_4",
+    "zarr_rate",
 ]
+
+_OTHERS = {"hdf5_rate": "hdf5", "zarr_rate": "zarr_arrays"}
 
 
 def __getattr__(name: str) -> Any:
     """Enter a reader when it is first asked for: most recordings are of other formats."""
     if name not in __all__:
         raise AttributeError(f"module 'tvident._formats' has no attribute {name!r}")
-    return getattr(import_module("tvident._formats.netcdf"), name)
+    return getattr(import_module(f"tvident._formats.{_OTHERS.get(name, 'netcdf')}"), name)

@@ -84,6 +84,17 @@ def rate_in(whole: Mapping[str, Any], parts: Sequence[Mapping[str, Any]], skippe
     return next(iter(rates), None)
 
 
+def rate_channel(
+    whole: Mapping[str, Any], parts: Sequence[Mapping[str, Any]], skipped: list[str]
+) -> Iterator[tuple[str, Any]]:
+    """Give the sample rate that the attributes of a file, or of its parts, hold, as a channel of one number."""
+    import numpy as np  # noqa: PLC0415 - within the limits
+
+    rate = rate_in(whole, parts, skipped)
+    if rate is not None:
+        yield "sample_rate [Hz]", np.float64(rate)
+
+
 def _rate(attributes: Mapping[str, Any]) -> Any:
     """Return the samples per second that attributes hold, or what they say where that is no number; None where they say nothing."""
     said = first_of(attributes, [name for name in attributes if _RATES.fullmatch(str(name))])

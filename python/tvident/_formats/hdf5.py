@@ -7,23 +7,17 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from typing import Any
 
-from tvident._formats.columns import COLUMNS, UNITS, channels_of, rate_in
+from tvident._formats.columns import COLUMNS, UNITS, channels_of, rate_channel
 from tvident._formats.told import Remark, cut, in_words
 
 
 def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     """Give every dataset of numbers, called by its path with dots, with the unit of its attributes; links are not followed."""
     import h5py  # noqa: PLC0415 - an extra
-    import numpy as np  # noqa: PLC0415 - within the limits
 
     with h5py.File(path, "r") as file:
         found = dict(datasets(file, "", h5py))
-        parts = {
-            one.name: one.attrs for dataset in found.values() for one in (dataset, dataset.parent) if one.name != "/"
-        }
-        rate = rate_in(file.attrs, list(parts.values()), skipped)
-        if rate is not None:
-            yield "sample_rate [Hz]", np.float64(rate)
+        yield from hdf5_rate(file, found, skipped)
         lists = dict(_lists(found))
         for name, dataset in found.items():
             bare = name.replace("/", ".")
@@ -42,6 +36,12 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
             # A list of the columns may stand beside a matrix, as a dataset of its own.
             beside = {one.rpartition("/")[2]: words for one, words in lists.items() if _is_beside(one, name)}
             yield from channels_of(bare, values, [dataset.attrs, beside, dataset.parent.attrs, file.attrs])
+
+
+def hdf5_rate(file: Any, found: Mapping[str, Any], skipped: list[str]) -> Iterator[tuple[str, Any]]:
+    """Give the sample rate in the attributes of a file, or else of its datasets and the groups that they are in."""
+    parts = {one.name: one.attrs for dataset in found.values() for one in (dataset, dataset.parent) if one.name != "/"}
+    yield from rate_channel(file.attrs, list(parts.values()), skipped)
 
 
 def _never_written(name: str, dataset: Any) -> Iterator[Remark]:

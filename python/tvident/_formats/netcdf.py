@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
 
-from tvident._formats.columns import UNITS, channels_of, first_of, rate_in
+from tvident._formats.columns import UNITS, channels_of, first_of, rate_channel
 from tvident._formats.hdf5 import datasets, read_whole
 from tvident._formats.told import cut
 
@@ -94,16 +94,16 @@ def _of_version_3(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     from scipy.io import netcdf_file  # noqa: PLC0415 - an extra
 
     with netcdf_file(path, "r", mmap=False) as file:
-        yield from _rate(file._attributes, [one._attributes for one in file.variables.values()], skipped)  # noqa: SLF001 - as SciPy keeps them
+        yield from netcdf_3_rate(file, skipped)
         for name, variable, labels in numbers_of_netcdf_3(file, skipped):
-            yield from _scaled(name, variable[:].copy(), variable._attributes, labels)  # noqa: SLF001 - likewise
+            yield from _scaled(name, variable.data.copy(), variable._attributes, labels)  # noqa: SLF001 - likewise
 
 
 def _of_version_4(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     import h5py  # noqa: PLC0415 - an extra
 
     with h5py.File(path, "r") as file:
-        yield from _rate(file.attrs, [one.attrs for _, one in datasets(file, "", h5py)], skipped)
+        yield from netcdf_4_rate(file, skipped)
         for name, dataset, labels in numbers_of_netcdf_4(file, skipped):
             values = read_whole(name, dataset, skipped)
             if values is not None:
@@ -112,7 +112,7 @@ def _of_version_4(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
 
 def numbers_of_netcdf_3(file: Any, skipped: list[str]) -> Iterator[tuple[str, Any, list[Any]]]:
     """Give every variable of numbers in a file as SciPy opens it: its name, itself, and what names its columns."""
-    labels = {name: one[:].copy() for name, one in file.variables.items() if one.data.dtype.kind in "SU"}
+    labels = {name: one.data.copy() for name, one in file.variables.items() if one.data.dtype.kind in "SU"}
     for name, variable in file.variables.items():
         if name in labels:
             is_used = any(name in one.dimensions for other, one in file.variables.items() if other != name)
@@ -142,14 +142,17 @@ def _is_no_variable(dataset: Any) -> bool:
     return bool(bytes(said if isinstance(said, bytes) else str(said).encode()).startswith(_NO_VARIABLE))
 
 
-def _rate(
-    whole: Mapping[str, Any], parts: Sequence[Mapping[str, Any]], skipped: list[str]
-) -> Iterator[tuple[str, Any]]:
-    import numpy as np  # noqa: PLC0415 - within the limits
+def netcdf_3_rate(file: Any, skipped: list[str]) -> Iterator[tuple[str, Any]]:
+    """Give the sample rate in the attributes of a file as SciPy opens it, or else of its variables."""
+    parts = [one._attributes for one in file.variables.values()]  # noqa: SLF001 - as SciPy keeps them
+    yield from rate_channel(file._attributes, parts, skipped)  # noqa: SLF001 - likewise
 
-    rate = rate_in(whole, parts, skipped)
-    if rate is not None:
-        yield "sample_rate [Hz]", np.float64(rate)
+
+def netcdf_4_rate(file: Any, skipped: list[str]) -> Iterator[tuple[str, Any]]:
+    """Give the sample rate in the attributes of a file as h5py opens it, or else of its variables."""
+    import h5py  # noqa: PLC0415 - an extra
+
+    yield from rate_channel(file.attrs, [one.attrs for _, one in datasets(file, "", h5py)], skipped)
 
 
 def _scaled(name: str, values: Any, attributes: Mapping[str, Any], labels: Sequence[Any]) -> Iterator[tuple[str, Any]]:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from tvident._formats.columns import channels_of, rate_in
+from tvident._formats.columns import channels_of, rate_channel
 from tvident._formats.told import Remark, cut, in_words
+
+_Found = dict[str, tuple[Any, list[Mapping[str, Any]]]]
 
 
 def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
@@ -15,11 +17,8 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     import zarr  # noqa: PLC0415 - an extra
 
     opened: Any = zarr.open(path, mode="r")
-    alone = isinstance(opened, zarr.Array)
-    found = {"": (opened, [dict(opened.attrs)])} if alone else dict(_arrays(opened, "", []))
-    rate = rate_in(dict(opened.attrs), [one for _, each in found.values() for one in each], skipped)
-    if rate is not None:
-        yield "sample_rate [Hz]", np.float64(rate)
+    found = _found(opened)
+    yield from _rate(opened, found, skipped)
     for name, (array, attributes) in found.items():
         if np.dtype(array.dtype).kind not in "biufc" and not np.dtype(array.dtype).names:
             skipped.append(f"{cut(name or '0')} (no numbers)")
@@ -36,6 +35,23 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
                 Remark(f"{cut(name or '0')}: {filled}, as Zarr means it; where they were lost, copy it again")
             )
         yield from channels_of(name or "0", values, attributes)
+
+
+def zarr_rate(opened: Any, skipped: list[str]) -> Iterator[tuple[str, Any]]:
+    """Give the sample rate in the attributes of an array or group that is open, or else of the arrays and groups inside."""
+    yield from _rate(opened, _found(opened), skipped)
+
+
+def _rate(opened: Any, found: _Found, skipped: list[str]) -> Iterator[tuple[str, Any]]:
+    yield from rate_channel(dict(opened.attrs), [one for _, each in found.values() for one in each], skipped)
+
+
+def _found(opened: Any) -> _Found:
+    """Return all arrays by their paths with dots, with their attributes and those of the groups that they are in."""
+    import zarr  # noqa: PLC0415 - an extra
+
+    alone = isinstance(opened, zarr.Array)
+    return {"": (opened, [dict(opened.attrs)])} if alone else dict(_arrays(opened, "", []))
 
 
 def _arrays(

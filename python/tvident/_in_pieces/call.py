@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from tvident import _arguments as arguments
 from tvident import _core
@@ -18,28 +15,20 @@ from tvident._equation import GivenTerm
 from tvident._files import (
     TEXT_ENDINGS,
     FileError,
-    FileWarning,
     check_apart,
     ending_of,
-    full_name,
     marks_given,
-    other_rate,
 )
 from tvident._identify import Method
 from tvident._in_pieces.copied import copied
-from tvident._in_pieces.file_rows import SourceChannel
 from tvident._in_pieces.found import FileIdentification
 from tvident._in_pieces.kept import Kept, mark_of
 from tvident._in_pieces.outputs import check_output
-from tvident._in_pieces.recorded import RecordingOfFile, uniform, units_of
+from tvident._in_pieces.recorded import RecordingOfFile, units_of
 from tvident._in_pieces.run import AskedOfFile, Run
+from tvident._in_pieces.sampling import begin_and_period
 from tvident._in_pieces.sources import Source, opened
 from tvident._pieces import Given
-from tvident._units import Channel as Said
-from tvident._units import named_unit, times_in_seconds
-
-_TIMES = 4096
-"""Samples whose times are held against the rate that is given."""
 
 PIECE, LONG_PIECE = 1 << 18, 3 << 18
 """Samples of a piece, about, and of one in weak form in which one unknown changes: what is computed of it fits into 150 MiB.
@@ -92,7 +81,8 @@ def identify_file(
     angle, torque : str
         Names of the channels, of shape (n,), or their numbers from 0. Units are those of the file, or rad and N m.
     sample_rate, delta : float, optional
-        Samples per second, or seconds from one to the next; by default from a channel of times.
+        Samples per second, or seconds from one to the next; by default what the file says, as :func:`read_recording` has it, or from a
+        channel of times.
     t : str, optional
         The channel of times, which must be uniform to a thousandth of their step; by default one that is called ``time``.
     weights : str, optional
@@ -210,7 +200,7 @@ def identify_file(
                 recording = replace(recording, opened=(source_path, mark))
             weighted = weights is not None
             if weights is not None:
-                recording = replace(recording, weights=_of_length(source, "weights", weights, recording.samples)[0])
+                recording = replace(recording, weights=source.of_length("weights", weights, recording.samples)[0])
             call = Given(method, given, settings, nan_policy, recording.period, recording.axis, threads, weighted)
             asked = AskedOfFile(recording, call, every)
             return Run(asked, kept, LONG_PIECE if asked.is_narrow else PIECE, place, report).all()
@@ -277,46 +267,5 @@ def _recording(
     if not samples:
         raise ValueError(f"a recording must hold samples; {source.place} has none; check it")
     axis = units_of(angle_says, torque_says, *units)
-    named = {one: named_unit(one) for one in source.channels}
-    times = [one for one, (name, unit) in named.items() if arguments.is_time(name, unit)]
-    if not times:
-        # Groups put their names before those of their channels; the times of which group, only one of them says.
-        grouped = [one for one, (name, unit) in named.items() if arguments.is_time(name.rpartition(".")[2], unit)]
-        times = grouped if len(grouped) == 1 else []
-    delta, rate = rates
-    if delta is not None or rate is not None:
-        if names[2] is not None:
-            raise TypeError("give only one of delta, sample_rate and t; got t too; drop all but one")
-        period = arguments.sample_period(samples, delta=delta, sample_rate=rate)
-        _say_other_rate(source, times, samples, 1 / period)
-        return RecordingOfFile(angle, torque, samples, 0.0, period, axis)
-    name = names[2]
-    if name is None:
-        if not times:
-            raise TypeError(
-                f"an identification needs the sample period; {source.place} has no channel of times; give sample_rate=, delta= or t="
-            )
-        name = times[0]
-    channel, unit = _of_length(source, "times", name, samples)
-    factor = float(times_in_seconds(Said(np.ones(1), unit))[0])
-    begin, period = uniform(channel, samples, factor, full_name(source.channels, name, source.place))
+    begin, period = begin_and_period(source, samples, rates, names[2])
     return RecordingOfFile(angle, torque, samples, begin, period, axis)
-
-
-def _say_other_rate(source: Source, times: Sequence[str], samples: int, rate: float) -> None:
-    """Warn where the first times of a recording show another rate than the one that was given, which is used."""
-    beside = {name: source.channels[name][0] for name in times if source.channels[name][1] == samples}
-    first = {name: channel.read(0, min(samples, _TIMES)) for name, channel in beside.items()}
-    words = other_rate(first, rate, source.place, "that channel as times") if first else None
-    if words is not None:
-        warnings.warn(words, FileWarning, stacklevel=4)
-
-
-def _of_length(source: Source, what: str, name: str, samples: int) -> tuple[SourceChannel, str]:
-    """Return a channel beside angle and torque, and its unit."""
-    channel, count, unit = source.channel(name)
-    if count != samples:
-        raise ValueError(
-            f"{what} must have one value for every sample; {name!r} has {count} for {samples}; leave it out, or take another channel"
-        )
-    return channel, unit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,12 +15,15 @@ from tvident._files import FileError, printable
 from tvident._formats import (
     NetcdfMeaning,
     is_netcdf_3,
+    netcdf_3_rate,
+    netcdf_4_rate,
     netcdf_columns,
     netcdf_meaning,
     numbers_of_netcdf_3,
     numbers_of_netcdf_4,
 )
 from tvident._in_pieces.file_rows import ColumnOfRows, RowsOfFile, SourceChannel, opened_by_h5py
+from tvident._in_pieces.said import SaidOfRate, said_of_rate
 
 Channels = dict[str, tuple[SourceChannel, int]]
 
@@ -48,8 +52,8 @@ class _OfDataset:
         return np.asarray(self.dataset[tuple(along)])
 
 
-def channels_in(path: Path) -> tuple[Channels, Callable[[], object]]:
-    """Return the channels of a file, and what closes it.
+def channels_in(path: Path) -> tuple[Channels, SaidOfRate, Callable[[], object]]:
+    """Return the channels of a file, what it says of its sample rate, and what closes it.
 
     Raises
     ------
@@ -63,10 +67,10 @@ def channels_in(path: Path) -> tuple[Channels, Callable[[], object]]:
     except ValueError as error:
         raise FileError(f"{printable(path)}: {error}") from None
     if is_old:
-        return _of_version_3(path), lambda: None
+        return *_of_version_3(path), lambda: None
     file = opened_by_h5py(path, "netCDF 4")
     try:
-        return _of_version_4(file), file.close
+        return *_of_version_4(file), file.close
     except (OSError, KeyError, RuntimeError) as error:
         file.close()
         raise FileError(
@@ -77,13 +81,22 @@ def channels_in(path: Path) -> tuple[Channels, Callable[[], object]]:
         raise
 
 
-def _of_version_4(file: Any) -> Channels:
+def _of_version_4(file: Any) -> tuple[Channels, SaidOfRate]:
     found: Channels = {}
+    single: dict[str, Any] = {}
     for name, dataset, labels in numbers_of_netcdf_4(file, []):
         meaning = netcdf_meaning(dataset.attrs)
+        single |= _single(name, dataset, meaning)
         for called, axis, place in _vectors(name, dataset, meaning, labels):
             found[called] = _AsMeant(_OfDataset(dataset, axis, place), meaning), dataset.shape[axis]
-    return found
+    return found, said_of_rate(lambda remarks: netcdf_4_rate(file, remarks), single)
+
+
+def _single(name: str, array: Any, meaning: NetcdfMeaning) -> dict[str, Any]:
+    """Return a single number by its name with its unit; nothing where an array holds more."""
+    if array.dtype.kind not in "iuf" or math.prod(array.shape) != 1:
+        return {}
+    return {netcdf_columns(name, (), meaning, [])[0]: meaning.of(np.array(array[()]))}
 
 
 def _vectors(
@@ -105,12 +118,13 @@ def _vectors(
         yield called, axis, tuple(place)
 
 
-def _of_version_3(path: Path) -> Channels:
+def _of_version_3(path: Path) -> tuple[Channels, SaidOfRate]:
     from scipy.io import netcdf_file  # noqa: PLC0415 - an extra
 
     try:
         with netcdf_file(path, "r", mmap=True) as file:
             lie = _places(file)
+            said = _said_by(file)
     except (TypeError, ValueError, IndexError, KeyError, OverflowError, EOFError) as error:
         raise FileError(
             f"{printable(path)}: must be whole; SciPy says: {printable(error, 200)}; copy it again, or save it with xarray's to_netcdf()"
@@ -128,7 +142,15 @@ def _of_version_3(path: Path) -> Channels:
         )
         rows = RowsOfFile(path, begin, row)
         found |= {one.name: (_AsMeant(ColumnOfRows(rows, one.name), one.meaning), one.samples) for one in together}
-    return {one.name: found[one.name] for one in lie}
+    return {one.name: found[one.name] for one in lie}, said
+
+
+def _said_by(file: Any) -> SaidOfRate:
+    """Return what a mapped file says of its sample rate; nothing of it may be referred to when the map is closed."""
+    single: dict[str, Any] = {}
+    for name, variable, _ in numbers_of_netcdf_3(file, []):
+        single |= _single(name, variable.data, netcdf_meaning(dict(variable._attributes)))  # noqa: SLF001 - as SciPy keeps them
+    return said_of_rate(lambda remarks: netcdf_3_rate(file, remarks), single)
 
 
 @dataclass(frozen=True)

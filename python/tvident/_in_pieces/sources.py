@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._files import TEXT_ENDINGS, FileError, ending_of, full_name, listed, printable, without_marks
+from tvident._formats import hdf5_rate, zarr_rate
 from tvident._in_pieces.file_rows import ColumnOfRows, RowsOfFile, SourceChannel, opened_by_h5py
+from tvident._in_pieces.said import NOTHING_SAID, SaidOfRate, said_of_rate
 from tvident._units import named_unit, with_unit
 
 _UNITS = ("unit", "units", "Unit", "Units", "UNITS")
@@ -31,11 +34,14 @@ class Source:
         Closes the file.
     place : str
         What messages call it.
+    said : SaidOfRate
+        What it says of its sample rate, and what of that is not read.
     """
 
     channels: Mapping[str, tuple[SourceChannel, int]]
     close: Callable[[], object]
     place: str
+    said: SaidOfRate = NOTHING_SAID
 
     def channel(self, name: str) -> tuple[SourceChannel, int, str]:
         """Return a channel by its name, how many samples it has, and its unit.
@@ -48,6 +54,21 @@ class Source:
         full = full_name(self.channels, name, self.place)
         channel, samples = self.channels[full]
         return channel, samples, named_unit(full)[1]
+
+    def of_length(self, what: str, name: str, samples: int) -> tuple[SourceChannel, str]:
+        """Return a channel beside angle and torque, and its unit.
+
+        Raises
+        ------
+        ValueError
+            If it has not one value for every sample.
+        """
+        channel, count, unit = self.channel(name)
+        if count != samples:
+            raise ValueError(
+                f"{what} must have one value for every sample; {name!r} has {count} for {samples}; leave it out, or take another channel"
+            )
+        return channel, unit
 
     def with_missing(self, marks: Sequence[float]) -> Source:
         """Return the same recording with NaN in place of numbers that mark missing values."""
@@ -138,13 +159,15 @@ def _hdf5(path: Path) -> Source:
             found[name.replace("/", ".")] = one
 
     file.visititems(note)
-    return _source(path, _of_arrays(found), file.close)
+    said = said_of_rate(lambda remarks: hdf5_rate(file, found, remarks), _single(found))
+    return replace(_source(path, _of_arrays(found), file.close), said=said)
 
 
 def _netcdf(path: Path) -> Source:
     from tvident._in_pieces.netcdf import channels_in  # noqa: PLC0415 - few need it
 
-    return _source(path, *channels_in(path))
+    channels, said, close = channels_in(path)
+    return replace(_source(path, channels, close), said=said)
 
 
 def _zarr(path: Path) -> Source:
@@ -160,12 +183,10 @@ def _zarr(path: Path) -> Source:
         raise FileError(
             f"{printable(path)}: must be a Zarr group or array; zarr says: {printable(error, 200)}"
         ) from None
-    if isinstance(opened, zarr.Array):
-        return _source(path, _of_arrays({"": opened}))
-    members = opened.members(max_depth=None)
-    return _source(
-        path, _of_arrays({name.replace("/", "."): one for name, one in members if isinstance(one, zarr.Array)})
-    )
+    members = [("", opened)] if isinstance(opened, zarr.Array) else opened.members(max_depth=None)
+    found = {name.replace("/", "."): one for name, one in members if isinstance(one, zarr.Array)}
+    said = said_of_rate(lambda remarks: zarr_rate(opened, remarks), _single(found))
+    return replace(_source(path, _of_arrays(found)), said=said)
 
 
 def _of_arrays(found: Mapping[str, Any]) -> dict[str, tuple[SourceChannel, int]]:
@@ -174,8 +195,7 @@ def _of_arrays(found: Mapping[str, Any]) -> dict[str, tuple[SourceChannel, int]]
     for name, array in found.items():
         if array.dtype.kind not in "iuf" or not array.shape:
             continue
-        said = next((array.attrs[one] for one in _UNITS if one in array.attrs), "")
-        units = [_text(one) for one in np.ravel(said).tolist()]
+        units = _units_of(array)
         if array.ndim == 1:
             channels[with_unit(name or "0", units[0] if len(units) == 1 else "")] = (_OfArray(array), array.shape[0])
         elif array.ndim == 2:  # noqa: PLR2004 - samples and channels
@@ -186,6 +206,20 @@ def _of_arrays(found: Mapping[str, Any]) -> dict[str, tuple[SourceChannel, int]]
                 full = with_unit(name if name and 1 in array.shape else f"{name}.{called}".lstrip("."), unit)
                 channels[full] = (_OfArray(array, place, is_row), max(array.shape))
     return channels
+
+
+def _units_of(array: Any) -> list[str]:
+    said = next((array.attrs[one] for one in _UNITS if one in array.attrs), "")
+    return [_text(one) for one in np.ravel(said).tolist()]
+
+
+def _single(found: Mapping[str, Any]) -> dict[str, Any]:
+    """Return single numbers by their names with units."""
+    return {
+        with_unit(name, units[0] if len(units := _units_of(array)) == 1 else ""): np.asarray(array[()])
+        for name, array in found.items()
+        if array.shape is not None and array.dtype.kind in "iuf" and math.prod(array.shape) == 1
+    }
 
 
 def _names_in_matrix(array: Any) -> tuple[list[str], bool]:
