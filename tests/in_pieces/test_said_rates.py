@@ -175,3 +175,39 @@ def test_times_come_before_what_is_written_above_a_text(tmp_path: Path, rig: Any
     with pytest.warns(recordings.FileWarning, match=r"states 'Sample rate: 1000 Hz'.*show 500 Hz, which is used"):
         found = tvident.identify_file(path, tmp_path / "out.npy", angle="angle", torque="torque", method="paper")
     assert found.settings["sample_rate"] == _RATE
+
+
+@pytest.mark.parametrize(
+    ("times", "words"),
+    [
+        ({"time": 1.7e18, "step": 2e6}, r"would be of the year .*'time \[ns\]', or give sample_rate="),
+        ({"time": 739000.0, "step": 2e-3 / 86400}, r"'time \[days\]', or give sample_rate="),
+    ],
+)
+def test_times_that_count_otherwise_are_asked_about(
+    tmp_path: Path, rig: Any, times: dict[str, float], words: str
+) -> None:
+    """They were seconds without a word: one sample in 2e6 s, or 4e7 Hz."""
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        file["angle"], file["torque"] = rig.angle, rig.torque
+        file["time"] = times["time"] + times["step"] * np.arange(rig.angle.size)
+    with pytest.raises(ValueError, match=words):
+        tvident.identify_file(path, tmp_path / "out.npy", angle="angle", torque="torque")
+
+
+def test_a_clock_is_found_as_in_memory(tmp_path: Path, rig: Any) -> None:
+    """A channel in a unit of time that increases was no clock, and of two that differ the first was one."""
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        file["angle"], file["torque"], file["stamp_of_drive"] = rig.angle, rig.torque, rig.time * 1e3 + 7
+        file["stamp_of_drive"].attrs["units"] = "ms"
+    assert tvident.read_recording(path).sample_rate == pytest.approx(_RATE)
+    call: dict[str, Any] = {"angle": "angle", "torque": "torque", "method": "paper"}
+    found = tvident.identify_file(path, tmp_path / "out.npy", **call)
+    assert found.settings["sample_rate"] == pytest.approx(_RATE)
+    with h5py.File(path, "a") as file:
+        del file["stamp_of_drive"]
+        file["time_1"], file["time_2"] = rig.time, rig.time * 1.5
+    with pytest.raises(TypeError, match=r"several channels of times \(time_1, time_2\); give sample_rate"):
+        tvident.identify_file(path, tmp_path / "none.npy", **call)

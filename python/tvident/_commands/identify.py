@@ -12,7 +12,7 @@ import numpy as np
 from tvident._commands.channels import channels_in
 from tvident._commands.identification import identified, inputs
 from tvident._commands.in_pieces import identify_in_pieces
-from tvident._commands.named import named, with_joint, with_stamps
+from tvident._commands.named import named, with_joint
 from tvident._commands.output import (
     PICTURE,
     RESULTS,
@@ -43,7 +43,7 @@ def identify(
     options = named(options, file)
     if in_pieces:
         others = {"plot": plot, "json": as_json, "explain": explain}
-        identify_in_pieces(file, output, settings_output, others, with_stamps(options))
+        identify_in_pieces(file, output, settings_output, others, options)
         return
     outputs = {RESULTS: output, PICTURE: plot, SETTINGS: settings_output}
     table = None if output is None or keeps_result(output) else Path(output)

@@ -14,6 +14,7 @@ from tvident._commands.channels import marks_missing
 from tvident._commands.equation import lag_of, terms_of
 from tvident._commands.given import given, wanted_progress
 from tvident._commands.method import NAMES, method_of
+from tvident._commands.named import with_joint_of_file
 from tvident._commands.output import RECORDING, RESULTS, SETTINGS, check_outputs, say
 from tvident._commands.settings import read_settings
 from tvident._commands.words import units_assumed
@@ -57,6 +58,7 @@ def identify_in_pieces(
             "--in-pieces goes from a FILE to a file; got "
             f"{'a pipe' if '-' in (file, output) else 'none'}; name the file, and give -o"
         )
+    options = with_joint_of_file(options, str(file))
     asked: dict[str, Any] = given(dict(options))
     refused = [
         name

@@ -12,6 +12,7 @@ import numpy as np
 from tvident import recordings
 from tvident._commands.channels import channels_in
 from tvident._files import increasing_times, joint_of, listed, printable, time_channels
+from tvident._in_pieces import names_in
 from tvident._units import named_unit
 
 TIME = "time"
@@ -38,9 +39,15 @@ def named(options: Mapping[str, Any], file: str | None) -> dict[str, Any]:
     return {**options, "angle": f"{joint}.position", "torque": f"{joint}.effort"}
 
 
-def with_stamps(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return options with what a joint's stamps are called in a bag, where nothing tells the times."""
-    return {**options, "time_channel": TIME} if _lacks_clock(options) else dict(options)
+def with_joint_of_file(options: Mapping[str, Any], file: str) -> dict[str, Any]:
+    """Return options with the names that the channels of a joint have in a file that is read piece by piece; its velocity is not read."""
+    rest = {name: value for name, value in options.items() if name != "joint"}
+    if options["joint"] is None:
+        return rest
+    of_joint = joint_of(names_in(Path(file)), options["joint"], file)
+    if "velocity" in of_joint:
+        click.echo(f"{of_joint['velocity']} is not used: --in-pieces takes angle and torque", err=True)
+    return {**rest, "angle": of_joint["position"], "torque": of_joint["effort"]}
 
 
 def _lacks_clock(options: Mapping[str, Any]) -> bool:

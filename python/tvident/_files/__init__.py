@@ -20,10 +20,11 @@ if TYPE_CHECKING:
     from tvident._files.joints import joint_of
     from tvident._files.no_values import marks_given, without_marks
     from tvident._files.rates import other_rate
-    from tvident._files.recorded import FileRecording, increasing_times, read_recording, said_otherwise, time_channels
+    from tvident._files.recorded import FileRecording, read_recording, said_otherwise
     from tvident._files.recordings import TEXT_ENDINGS, read
     from tvident._files.stated import StatedRate, stated_rate
-    from tvident._files.text import copy_text
+    from tvident._files.text import copy_text, names_of_text
+    from tvident._files.which_clock import check_no_counts, clock_among, increasing_times, time_channels
 
 __all__ = [
     "TABLE_ENDINGS",
@@ -38,7 +39,9 @@ __all__ = [
     "check_apart",
     "check_beside",
     "check_folder",
+    "check_no_counts",
     "check_place",
+    "clock_among",
     "copy_text",
     "counters",
     "ending_by",
@@ -51,6 +54,7 @@ __all__ = [
     "listed",
     "marks_given",
     "named_field",
+    "names_of_text",
     "other_rate",
     "place_beside",
     "printable",
@@ -79,15 +83,18 @@ _READERS = {
     "other_rate": "rates",
     "without_marks": "no_values",
     "FileRecording": "recorded",
-    "increasing_times": "recorded",
     "read_recording": "recorded",
     "said_otherwise": "recorded",
-    "time_channels": "recorded",
     "read": "recordings",
     "TEXT_ENDINGS": "recordings",
     "StatedRate": "stated",
     "stated_rate": "stated",
     "copy_text": "text",
+    "names_of_text": "text",
+    "check_no_counts": "which_clock",
+    "clock_among": "which_clock",
+    "increasing_times": "which_clock",
+    "time_channels": "which_clock",
 }
 """Where what reads comes from: entered when first asked for, since it takes a quarter of what all of `identify` takes to load."""
 

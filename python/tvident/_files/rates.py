@@ -6,7 +6,8 @@ import numpy as np
 
 from tvident._files.channels import Channels
 from tvident._files.names import printable
-from tvident._files.recorded import FileRecording, time_channels
+from tvident._files.recorded import FileRecording
+from tvident._files.which_clock import time_channels
 from tvident._units import named_unit
 
 _NOTABLE = 1e-3

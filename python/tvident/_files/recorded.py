@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +19,13 @@ from tvident._files.names import listed, printable
 from tvident._files.recordings import read
 from tvident._files.stated import stated_rate
 from tvident._files.table import write_table
+from tvident._files.which_clock import check_no_counts, clock_among, increases, increasing_times, time_channels
 from tvident._units import (
-    ROTARY,
     Channel,
     UnitError,
     factor_between,
     named_unit,
     times_in_seconds,
-    unit_of,
-    unit_said,
     with_unit,
 )
 
@@ -37,34 +35,8 @@ _PERIOD = re.compile(r"(ts|dt|delta_?t|t_?sample|t_?samp|sampl(e|ing)_?(time|per
 """What single numbers are called that are samples per second, and seconds per sample."""
 
 
-_NUMBERED = re.compile(r"[\s_.]*\d+$")
-"""What tells clocks of one name apart, as time_2 and t1."""
-
 _NOTABLE = 0.01
 """Of a rate: times have few digits, and recorders round what they state."""
-
-
-def time_channels(names: Iterable[str]) -> list[str]:
-    """Return the names, without units and groups, of channels that are called as times are."""
-    bare = (named_unit(name)[0].rpartition(".")[2] for name in names)
-    return [name for name in bare if arguments.is_called_time(name)]
-
-
-def _increases(values: npt.NDArray[Any]) -> bool:
-    """Return whether a channel increases all the time, as another clock does, which tells nothing of this one."""
-    samples = np.asarray(values)
-    return bool((samples[1:] > samples[:-1]).all())
-
-
-def increasing_times(channels: Mapping[str, npt.NDArray[Any]]) -> list[str]:
-    """Return the names of channels in a unit of time that increase from sample to sample, whatever they are called."""
-    found = []
-    for name, values in channels.items():
-        unit = unit_of(named_unit(name)[1] or unit_said(values))
-        is_duration = unit is not None and unit.dimension == ROTARY.dimensions["time"]
-        if is_duration and values.ndim == 1 and values.size > 1 and _increases(values):
-            found.append(name)
-    return found
 
 
 @arguments.called_as("FileRecording({'angle [deg]': angle, 'torque [N m]': torque})")
@@ -185,10 +157,11 @@ class FileRecording(Mapping[str, Channel]):
                 f"a sample rate needs a channel of times; {self._source} has {had}; {cure}give sample_rate= where it is needed"
             )
         try:
-            _check_no_counts(time, getattr(self._clock(), "unit", ""))
+            step = float(time[-1] - time[0]) / (time.size - 1)
+            check_no_counts(float(time[0]), step, getattr(self._clock(), "unit", ""))
             period = arguments.sample_period(time.size, t=time)
             for values in self._channels.values():
-                if values.dtype.kind in "iuf" and values.shape == time.shape and not _increases(values):
+                if values.dtype.kind in "iuf" and values.shape == time.shape and not increases(values):
                     arguments.check_no_lost_samples(time, values)
         except arguments.NotUniformError as error:
             lost = next((part for part in str(error).split("; ") if part.startswith("samples are lost")), "")
@@ -218,18 +191,8 @@ class FileRecording(Mapping[str, Channel]):
 
     def _clock(self) -> Channel | None:
         """Return the channel of times; None where there is none, or several that differ."""
-        long = {name: values for name, values in self._channels.items() if values.ndim == 1 and values.size > 1}
-        found = [name for name, values in long.items() if arguments.is_time(name, values.unit)]
-        # Structures and groups put their names before those of their channels.
-        grouped = [name for name, values in long.items() if arguments.is_time(name.rpartition(".")[2], values.unit)]
-        # A clock that is called more closely, as that of the system, may have begun long before; of two such none comes first.
-        found.sort(key=lambda name: (arguments.is_of_one_clock(name), len(name)))
-        is_closer = bool(found) and arguments.is_of_one_clock(found[0])
-        alike = [name for name in found if is_closer or _NUMBERED.sub("", name) == _NUMBERED.sub("", found[0])]
-        called = alike or (grouped if len(grouped) == 1 else increasing_times(long))
-        # Groups that were sampled together have one clock.
-        called = called[:1] if all(_is_one_clock(long[called[0]], long[name]) for name in called[1:]) else called
-        return long[called[0]] if len(called) == 1 else None
+        name = clock_among(self._channels)
+        return None if name is None else self._channels[name]
 
     def _cure_of_times(self) -> str:
         """Return what to do about a channel that is called as times are, and whose unit is none of time, or may mean several."""
@@ -329,26 +292,6 @@ def _rate_of(name: str, value: Channel) -> float | None:
     return None
 
 
-def _check_no_counts(time: npt.NDArray[np.float64], unit_said: str) -> None:
-    """Refuse times so large that they count smaller parts of seconds since 1970, as clocks of computers do."""
-    counted = arguments.counted_since_1970(float(time[0]))
-    if counted is not None:
-        unit, words = counted
-        raise ValueError(
-            f"the first, {words}; call the channel 'time [{unit}]', or give t= and time_unit='{unit}', if it counts such since 1970"
-        )
-    step = float(time[-1] - time[0]) / (time.size - 1)
-    if 0 < step <= arguments.MAY_BE_DAYS and unit_said:
-        raise ValueError(
-            f"one sample in {step:.4g} s would be {1 / step:.4g} Hz; check whether the channel is in {unit_said}, and call it by its unit"
-        )
-    if 0 < step <= arguments.MAY_BE_DAYS:
-        raise ValueError(
-            f"one sample in {step:.4g} s would be {1 / step:.4g} Hz; call the channel 'time [days]', or give t= and time_unit='days', if "
-            "it counts days, as datenum of MATLAB and spreadsheets do"
-        )
-
-
 @arguments.called_as("read_recording('run.csv')")
 def read_recording(path: str | Path, *, missing: float | Sequence[float] = ()) -> FileRecording:
     """Read a recording from a file: its channels by name, with their units and the sample rate.
@@ -421,17 +364,3 @@ def said_otherwise(path: Path, channels: Mapping[str, npt.NDArray[Any]]) -> str:
     if abs(shown / stated.rate - 1) < _NOTABLE:
         return ""
     return f"it states '{stated.words}', {stated.rate:.6g} Hz, and its times show {shown:.6g} Hz, which is used: check which is right"
-
-
-def _is_one_clock(one: Channel, other: Channel) -> bool:
-    """Return whether two channels of times show the same, or differ by less than a hundredth of a step, as rounding makes them."""
-    if one.shape != other.shape:
-        return False
-    if np.array_equal(one, other):
-        return True
-    try:
-        first, second = (np.asarray(times_in_seconds(clock), np.float64) for clock in (one, other))
-    except UnitError:
-        return False
-    step = float(np.median(np.abs(np.diff(first))))
-    return bool(np.max(np.abs(first - second)) < _NOTABLE * step)

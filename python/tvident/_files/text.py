@@ -160,6 +160,16 @@ def copy_text(path: Path, rows: IO[bytes], say: Say) -> list[str | None]:
     return _decoded(path, copy)
 
 
+def names_of_text(path: Path) -> list[str]:
+    """Return what the columns of a text are called; those of words too, which only all of its lines tell."""
+
+    def begin(file: TextIO) -> list[str]:
+        begun = _begun(file, None, lambda _: None)
+        return [] if begun is None else list(begun[0].names)
+
+    return _decoded(path, begin)
+
+
 def _copied(file: TextIO, copy: IO[bytes], decimal: str | None, say: Say) -> list[str | None]:
     begun = _begun(file, decimal, say)
     if begun is None:

@@ -11,7 +11,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tvident._files import TEXT_ENDINGS, FileError, ending_of, full_name, listed, printable, without_marks
+from tvident._files import (
+    TEXT_ENDINGS,
+    FileError,
+    ending_of,
+    full_name,
+    listed,
+    names_of_text,
+    printable,
+    without_marks,
+)
 from tvident._formats import hdf5_rate, zarr_rate
 from tvident._in_pieces.file_rows import ColumnOfRows, RowsOfFile, SourceChannel, opened_by_h5py
 from tvident._in_pieces.said import NOTHING_SAID, SaidOfRate, said_of_rate
@@ -286,3 +295,23 @@ def opened(path: Path) -> Source:
         source.close()
         raise FileError(f"{place}: holds no channels; {listed(['nothing that is a column of real numbers'])}")
     return source
+
+
+def names_in(path: Path) -> list[str]:
+    """Return what the channels of a recording are called, with their units.
+
+    Raises
+    ------
+    FileError
+        If there is none, or it cannot be read piece by piece.
+    ImportError
+        If its library is missing.
+    """
+    if ending_of(path).lower() in TEXT_ENDINGS and path.is_file():
+        try:
+            return names_of_text(path)
+        except FileError as error:
+            raise FileError(f"{printable(path)}: cannot be read as text: {error}") from None
+    source = opened(path)
+    source.close()
+    return list(source.channels)
