@@ -120,7 +120,8 @@ def mixed_line(lines: Sequence[str]) -> str:
             cells = split(line, separator)
             words = [cell for cell in cells if not _is_number(cell)]
             if words and all(_BEGINS_AS_NUMBER.match(cell) for cell in cells if cell):
-                return f"'{printable(words[0], 40)}' in line {index + 1} is no number, nor a time that is known; "
+                cure = "begin comments with #; " if "%" in words[0] or "//" in words[0] else ""
+                return f"'{printable(words[0], 40)}' in line {index + 1} is no number, nor a time that is known; {cure}"
     return ""
 
 

@@ -119,7 +119,8 @@ def read(path: str | Path, *, missing: float | Sequence[float] = ()) -> Channels
     ``2024-12-31T12:30:00``) become seconds: of the day, or since the first where there are dates. Columns of words are not read, which is
     said.
     An empty cell, ``nan``, ``NA`` or ``null`` is a missing value; so are errors of spreadsheets (``#DIV/0!``) and words of
-    instruments (``OVLD``, ``overflow``, ``No Data``), which is said. ``1.0D+03`` is a number of Fortran. Comments begin with #. Text that
+    instruments (``OVLD``, ``overflow``, ``No Data``), which is said. ``1.0D+03`` is a number of Fortran. Comments begin with #, behind
+    numbers and between rows also with % or //. Text that
     gzip packed (``.csv.gz``) is read as what it holds. Files of LabVIEW (``.lvm``) and OpenSim (``.mot``, ``.sto``) have the units of
     their headers.
 

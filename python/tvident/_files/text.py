@@ -14,11 +14,13 @@ import numpy as np
 
 from tvident._arguments import is_called_time
 from tvident._files.channels import Channels, FileError, Say
+from tvident._files.comments import Comments
 from tvident._files.dialect import Dialect, dialect_of, mixed_line
 from tvident._files.headers import CURE
 from tvident._files.lists import without_lists
 from tvident._files.names import printable
 from tvident._files.rows import Numbers, OtherDecimalSignError, Rows, check_text
+from tvident._files.statistics_below import without_statistics
 from tvident._files.times import TimeColumn
 from tvident._files.unpacked import opened
 from tvident._units import named_unit, with_unit
@@ -206,6 +208,8 @@ def _begun(file: TextIO, decimal: str | None, say: Say) -> tuple[Dialect, Rows, 
         _refuse_long_line(head.count("\n") + 1)
     head += rest
     check_text(head, 0)
+    comments = Comments(head)
+    head = comments.behind(head)
     lines = _with_whole_names(head.split("\n"))
     longest = max(range(len(lines)), key=lambda index: len(lines[index]))
     if len(lines[longest]) > _LONGEST_LINE:
@@ -220,9 +224,10 @@ def _begun(file: TextIO, decimal: str | None, say: Say) -> tuple[Dialect, Rows, 
     dialect = replace(dialect, decimal=decimal, first=_first_that_holds_anything(lines, dialect, say))
     rows = Rows(dialect, say)
     rows.skip(dialect.first)
+    comments.repeat(dialect.above)
     first = "\n".join(lines[dialect.first :])
     pieces = chain([first], _pieces(file, head.count("\n")))
-    return dialect, rows, map(rows.read, pieces)
+    return dialect, rows, map(rows.read, map(comments.all, pieces))
 
 
 def _first_that_holds_anything(lines: Sequence[str], dialect: Dialect, say: Say) -> int:
@@ -318,6 +323,7 @@ def _columns(dialect: Dialect, parts: list[Numbers], rows: Rows, say: Say) -> Ch
         start += len(part)
     if rows.hollow:
         columns = columns[:, : -rows.hollow]
+    columns = without_statistics(columns, say)
     if not dialect.named:
         # A separator at the end of every line makes no column.
         while width > 1 and np.isnan(columns[width - 1]).all():
