@@ -337,3 +337,35 @@ def test_a_narrow_screen_needs_no_scrolling_aside_and_night_is_dark(
             opened.page.wait_for_function(drawn, arg=before)
         before = opened.drawn("Stiffness K")["colour"]
     opened.close()
+
+
+@pytest.mark.parametrize("width", [320, 360, 400])
+def test_nothing_leaves_its_card_on_a_narrow_screen(browser: Any, tmp_path: Path, width: int) -> None:
+    """At 320 points cards with their errors were 31 wider than the screen; names of channels and files may be long, without a blank."""
+    rig = tvident.simulate_torsional_rig(20.0)
+    result = tvident.identify(rig.angle, rig.torque, sample_rate=1000.0)
+    names = (
+        "Knee moment, filtered at 20 Hz, of the treadmill's third plate [N m]",
+        f"{'Motor' * 20}_0123456789 [mN m]",
+    )
+    path = tmp_path / f"{'Run' * 30}.html"
+    result.report(path, channels=dict.fromkeys(names, rig.torque))
+    phone = {"viewport": {"width": width, "height": 780}, "is_mobile": True, "has_touch": True}
+    opened = Opened(browser, path, color_scheme="dark", **phone)
+    opened.ask("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
+    opened.ask("""async () => {
+        for (const chart of tvidentReport.charts) {
+            chart.isNear = true;
+            await chart.draw();
+        }
+    }""")
+    spilled = opened.ask("""[...document.querySelectorAll("body, body *:not(svg, svg *, pre *)")].filter((one) => {
+        const {left, right, width} = one.getBoundingClientRect(), shown = getComputedStyle(one);
+        const within = one.scrollWidth <= one.clientWidth + 1 || shown.overflowX !== "visible" || shown.display === "inline";
+        return width && (left < -0.5 || right > innerWidth + 0.5 || (one.clientWidth && !within));
+    }).map((one) => `${one.tagName}.${one.className}: ${one.textContent.slice(0, 40)}`)""")
+    assert not spilled
+    assert opened.ask("innerWidth") == width
+    # A sign is never parted from its number.
+    assert "± " not in opened.ask("document.querySelector('#verdict p').textContent")
+    opened.close()

@@ -241,7 +241,10 @@
     return made;
   }
 
-  const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1) + (/[.?!]$/.test(text) ? "" : ".");
+  // A number stays on one line with its sign and its percent.
+  const together = (text) => text.replaceAll("± ", "±\u00a0").replaceAll(" %", "\u00a0%");
+
+  const sentence = (text) => together(text.charAt(0).toUpperCase() + text.slice(1) + (/[.?!]$/.test(text) ? "" : "."));
 
   function timeButton(from, to) {
     const round = (value) => Number(value.toFixed(3));
@@ -258,6 +261,8 @@
 
   function write() {
     byId("verdict").classList.add(content.tone);
+    const verdict = byId("verdict").lastElementChild;
+    verdict.textContent = together(verdict.textContent);
     byId("sign").textContent = { good: "✓", doubtful: "!", bad: "✕" }[content.tone];
     const first = content.series[0];
     if (first) byId("facts").textContent = content.facts ?? `${first.count.toLocaleString("en").replaceAll(",", "\u202f")} samples, ${Number((END - START).toPrecision(4))} s`;
