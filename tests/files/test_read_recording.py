@@ -309,3 +309,18 @@ def test_json_is_known_from_a_pipe() -> None:
     told = CliRunner().invoke(main, ["info", "-"], input=lines)
     assert told.exit_code == 0
     assert "uniform: 500 per unit" in told.stdout
+
+
+@pytest.mark.parametrize(("name", "number"), [("fs", 500.0), ("dt", 0.002), ("sample_rate [kHz]", 0.5)])
+def test_a_single_number_that_contradicts_the_times_is_said(tmp_path: Path, name: str, number: float) -> None:
+    """The number was taken without a word: a logger that keeps every second sample makes the inertia four times as small."""
+    path = tmp_path / "x.npz"
+    channels: dict[str, Any] = {"time [s]": T, "angle": np.sin(T), name: number}
+    np.savez(path, **channels)
+    with pytest.warns(recordings.FileWarning, match=r"says 500 Hz, which is used, and its times show 250 Hz: check"):
+        recording = tvident.read_recording(path)
+    assert recording.sample_rate == 500
+    np.savez(path, **channels | {"time [s]": T / 2})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert tvident.read_recording(path).sample_rate == 500

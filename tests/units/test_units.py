@@ -254,6 +254,12 @@ def test_a_degree_in_german_is_asked_for(text: str) -> None:
         factor_to(ROTARY, "angle", text, name="the angle")
 
 
+@pytest.mark.parametrize("text", ["tr", "Umdr.", "tr."])
+def test_turns_in_other_languages(text: str) -> None:
+    """``Angle (tr)`` was unknown beside ``tr/min``."""
+    assert factor_to(ROTARY, "angle", text, name="the angle") == math.tau
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [

@@ -353,14 +353,19 @@ def read_recording(path: str | Path, *, missing: float | Sequence[float] = ()) -
 
 
 def said_otherwise(path: Path, channels: Mapping[str, npt.NDArray[Any]]) -> str:
-    """Return that lines above the numbers of a text state another sample rate than its times show; nothing where they do not."""
-    stated = stated_rate(path) if time_channels(channels) or increasing_times(channels) else None
-    if stated is None:
+    """Return that lines above the numbers of a text, or a single number, state another sample rate than the times; nothing elsewhere."""
+    if not (time_channels(channels) or increasing_times(channels)):
         return ""
     try:
-        shown = FileRecording(channels).sample_rate
+        shown = FileRecording({name: values for name, values in channels.items() if values.size > 1}).sample_rate
     except ValueError:
         return ""
-    if abs(shown / stated.rate - 1) < _NOTABLE:
+    for name, values in FileRecording(channels).items():
+        rate = _rate_of(name, values) if values.size == 1 else None
+        if rate is not None:
+            words = f"{printable(name, 40)} says {rate:.6g} Hz, which is used, and its times show {shown:.6g} Hz"
+            return "" if abs(shown / rate - 1) < _NOTABLE else f"{words}: check which is right"
+    stated = stated_rate(path)
+    if stated is None or abs(shown / stated.rate - 1) < _NOTABLE:
         return ""
     return f"it states '{stated.words}', {stated.rate:.6g} Hz, and its times show {shown:.6g} Hz, which is used: check which is right"

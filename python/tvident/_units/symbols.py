@@ -145,7 +145,8 @@ ROTATIONS: dict[str, tuple[float, Dimension]] = {
     **dict.fromkeys(("u/min", "umdr/min", "r/min", "tr/min"), _RPM),
     **dict.fromkeys(("rps", "r/s", "u/s", "tr/s"), _TURNS),
     "dps": _DEGREES,
+    **dict.fromkeys(("umdr", "tr"), (math.tau, _ANGLE)),
 }
-"""Speeds of turning in letters that mean nothing elsewhere, in small letters and without points."""
+"""Turns and speeds of turning in letters that mean nothing elsewhere, in small letters and without points."""
 
 LONGEST = max(map(len, SYMBOLS))
