@@ -7,7 +7,7 @@ import numpy as np
 from tvident._files.channels import Channels
 from tvident._files.names import printable
 from tvident._files.recorded import FileRecording
-from tvident._files.which_clock import time_channels
+from tvident._files.which_clock import may_be_of_other_unit, time_channels
 from tvident._units import named_unit
 
 _NOTABLE = 1e-3
@@ -15,9 +15,6 @@ _NOTABLE = 1e-3
 
 _ROUGHLY = 0.1
 """Part of a step by which the usual one and the mean may differ, where times are not uniform."""
-
-_OF_UNITS = (1e3, 1e6, 1e9, 60.0, 3600.0, 86400.0)
-"""By which times without a unit differ from seconds: milliseconds to days."""
 
 
 def other_rate(channels: Channels, rate: float, place: str, option: str) -> str | None:
@@ -32,7 +29,7 @@ def other_rate(channels: Channels, rate: float, place: str, option: str) -> str 
     by = max(shown / rate, rate / shown)
     times = time_channels(channels)
     has_unit = any(recording.units.get(named_unit(name)[0]) for name in times)
-    if by < 1 + notable or (not has_unit and any(abs(by / one - 1) < notable for one in _OF_UNITS)):
+    if by < 1 + notable or (not has_unit and may_be_of_other_unit(by, notable)):
         return None
     name = printable((times or ["the channel of times"])[0])
     roughly = f"{shown:.7g} Hz" if notable == _NOTABLE else f"about {float(f'{shown:.3g}'):.7g} Hz"

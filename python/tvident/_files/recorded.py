@@ -19,7 +19,14 @@ from tvident._files.names import listed, printable
 from tvident._files.recordings import read
 from tvident._files.stated import stated_rate
 from tvident._files.table import write_table
-from tvident._files.which_clock import check_no_counts, clock_among, increases, increasing_times, time_channels
+from tvident._files.which_clock import (
+    check_no_counts,
+    clock_among,
+    increases,
+    increasing_times,
+    may_be_of_other_unit,
+    time_channels,
+)
 from tvident._units import (
     Channel,
     UnitError,
@@ -357,12 +364,16 @@ def said_otherwise(path: Path, channels: Mapping[str, npt.NDArray[Any]]) -> str:
     if not (time_channels(channels) or increasing_times(channels)):
         return ""
     try:
-        shown = FileRecording({name: values for name, values in channels.items() if values.size > 1}).sample_rate
+        recording = FileRecording({name: values for name, values in channels.items() if values.size > 1})
+        shown = recording.sample_rate
     except ValueError:
         return ""
     for name, values in FileRecording(channels).items():
         rate = _rate_of(name, values) if values.size == 1 else None
         if rate is not None:
+            clock = recording._clock()  # noqa: SLF001 - of this class
+            if not (clock is not None and clock.unit) and may_be_of_other_unit(shown / rate, _NOTABLE):
+                return ""
             words = f"{printable(name, 40)} says {rate:.6g} Hz, which is used, and its times show {shown:.6g} Hz"
             return "" if abs(shown / rate - 1) < _NOTABLE else f"{words}: check which is right"
     stated = stated_rate(path)

@@ -19,6 +19,15 @@ _ALIKE = 0.01
 """Of a step: clocks of groups that were sampled together differ by rounding."""
 
 
+_OF_UNITS = (1e3, 1e6, 1e9, 60.0, 3600.0, 86400.0)
+"""By which times without a unit differ from seconds: milliseconds to days."""
+
+
+def may_be_of_other_unit(by: float, notable: float) -> bool:
+    """Return whether rates that differ by a factor may do so since times without a unit are in ms or minutes, say."""
+    return any(abs(max(by, 1 / by) / one - 1) < notable for one in _OF_UNITS)
+
+
 def time_channels(names: Iterable[str]) -> list[str]:
     """Return the names, without units and groups, of channels that are called as times are."""
     bare = (named_unit(name)[0].rpartition(".")[2] for name in names)
