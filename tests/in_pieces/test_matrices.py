@@ -58,3 +58,38 @@ def test_a_column_that_is_called_as_a_part_of_a_structure_is_asked_for(
     np.testing.assert_array_equal(channels["joint.angle_2"], 2 * matrix[1])
     with pytest.raises(recordings.FileError, match=r"'joint\.angle' is a column, and a part of a structure; rename"):
         tvident.identify_file(path, tmp_path / "out.csv", angle="joint.angle", torque="joint.torque", sample_rate=1e3)
+
+
+def _structures(path: Path, rig: Any) -> None:
+    rows = np.empty(rig.time.size, [("time", "f8"), ("angle_deg", "f8"), ("torque", "f8")])
+    rows["time"], rows["angle_deg"], rows["torque"] = rig.time, np.degrees(rig.angle), rig.torque
+    with h5py.File(path, "w") as file:
+        file["rig/data"] = rows
+
+
+def _list_beside(path: Path, rig: Any) -> None:
+    with h5py.File(path, "w") as file:
+        file["data"] = np.stack([np.degrees(rig.angle), rig.torque], axis=1)
+        file["columns"] = np.array(["angle [deg]", "torque"], dtype="S20")
+        file["fs"] = 1000.0
+
+
+def _list_of_the_group(path: Path, rig: Any) -> None:
+    with h5py.File(path, "w") as file:
+        file["run/data"] = np.stack([np.degrees(rig.angle), rig.torque])
+        file["run"].attrs["channel_names"] = ["angle", "torque"]
+        file["run"].attrs["units"] = ["deg", "N m"]
+        file.attrs["fs"] = 1000.0
+
+
+@pytest.mark.parametrize("write", [_structures, _list_beside, _list_of_the_group])
+def test_names_and_units_are_those_in_memory(tmp_path: Path, write: Any) -> None:
+    """A list of columns beside a matrix, or at its group, was not read: degrees were rad without a word. Structures had no channels."""
+    rig = tvident.simulate_torsional_rig(duration=4.0, pattern="constant")
+    path = tmp_path / "run.h5"
+    write(path, rig)
+    recording = tvident.read_recording(path)
+    assert {recording[name].unit for name in recording if "angle" in name} == {"deg"}
+    found = tvident.identify_file(path, tmp_path / "out.csv", angle="angle", torque="torque", stiffness="constant")
+    whole = tvident.identify(rig.angle, rig.torque, sample_rate=1000.0, stiffness="constant")
+    assert found.constants["inertia"][0] == pytest.approx(whole.value("inertia").value, rel=1e-6)

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 from tvident._formats.known import FOLDERS, FORMATS, PROCESS, Format
 
 if TYPE_CHECKING:
-    from tvident._formats.hdf5 import hdf5_rate
+    from tvident._formats.columns import columns_of
+    from tvident._formats.hdf5 import datasets, hdf5_arrays, hdf5_rate
     from tvident._formats.netcdf import (
         NetcdfMeaning,
         is_netcdf_3,
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
         numbers_of_netcdf_3,
         numbers_of_netcdf_4,
     )
-    from tvident._formats.zarr_arrays import zarr_rate
+    from tvident._formats.zarr_arrays import zarr_found, zarr_rate
 
 __all__ = [
     "FOLDERS",
@@ -25,6 +26,9 @@ __all__ = [
     "PROCESS",
     "Format",
     "NetcdfMeaning",
+    "columns_of",
+    "datasets",
+    "hdf5_arrays",
     "hdf5_rate",
     "is_netcdf_3",
     "netcdf_3_rate",
@@ -33,10 +37,15 @@ __all__ = [
     "netcdf_meaning",
     "numbers_of_netcdf_3",
     "numbers_of_netcdf_4",
+    "zarr_found",
     "zarr_rate",
 ]
 
-_OTHERS = {"hdf5_rate": "hdf5", "zarr_rate": "zarr_arrays"}
+_OTHERS = {
+    "columns_of": "columns",
+    **dict.fromkeys(("datasets", "hdf5_arrays", "hdf5_rate"), "hdf5"),
+    **dict.fromkeys(("zarr_found", "zarr_rate"), "zarr_arrays"),
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -40,9 +40,13 @@ def channels_of(name: str, array: Any, attributes: Sequence[Mapping[str, Any]]) 
     matrix = array.reshape([length for length in array.shape if length > 1])
     # A list that has the name of the matrix itself is one of what lies beside it.
     own = name.rpartition(".")[2]
-    names = next((one for each in attributes if (one := _list_in(each, matrix.shape)) and own not in one), [])
+    lists = ((_list_in(each, matrix.shape), each) for each in attributes)
+    names, beside = next(((one, each) for one, each in lists if one and own not in one), ([], {}))
     count = len(names) or min(matrix.shape)
     units = _words(unit)
+    # Units of the columns stand where their names do.
+    if unit is None and len(of_names := _words(first_of(beside, UNITS))) == count:
+        units = of_names
     if not names and not isinstance(unit, str) and len(units) != count:
         yield name, array
         return
@@ -51,6 +55,13 @@ def channels_of(name: str, array: Any, attributes: Sequence[Mapping[str, Any]]) 
     for place, samples in enumerate(columns):
         column = names[place] if names else str(place)
         yield _named(f"{name}.{column}" if name else column, of_columns[place]), samples
+
+
+def columns_of(name: str, array: Any, attributes: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the names, with units, of the columns of an array that is not read, or its own where nothing names or numbers these."""
+    import numpy as np  # noqa: PLC0415 - within the limits
+
+    return [called for called, _ in channels_of(name, np.broadcast_to(np.zeros(()), array.shape), attributes)]
 
 
 def first_of(attributes: Mapping[str, Any], names: Sequence[str]) -> Any:

@@ -18,11 +18,7 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     with h5py.File(path, "r") as file:
         found = dict(datasets(file, "", h5py))
         yield from hdf5_rate(file, found, skipped)
-        lists = dict(_lists(found))
-        for name, dataset in found.items():
-            bare = name.replace("/", ".")
-            if name in lists:
-                continue
+        for bare, (dataset, attributes) in hdf5_arrays(file, found).items():
             if dataset.shape is None:  # h5py calls this Empty
                 skipped.append(f"{cut(bare)} (no samples)")
                 continue
@@ -33,9 +29,20 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
             if values is None:
                 continue
             skipped += _never_written(cut(bare), dataset)
-            # A list of the columns may stand beside a matrix, as a dataset of its own.
-            beside = {one.rpartition("/")[2]: words for one, words in lists.items() if _is_beside(one, name)}
-            yield from channels_of(bare, values, [dataset.attrs, beside, dataset.parent.attrs, file.attrs])
+            yield from channels_of(bare, values, attributes)
+
+
+def hdf5_arrays(file: Any, found: Mapping[str, Any]) -> dict[str, tuple[Any, list[Mapping[str, Any]]]]:
+    """Return datasets by their paths with dots, with attributes: their own, lists beside them, and those of what they are in."""
+    lists = dict(_lists(found))
+    arrays = {}
+    for name, dataset in found.items():
+        if name in lists:
+            continue
+        # A list of the columns may stand beside a matrix, as a dataset of its own.
+        beside = {one.rpartition("/")[2]: words for one, words in lists.items() if _is_beside(one, name)}
+        arrays[name.replace("/", ".")] = (dataset, [dataset.attrs, beside, dataset.parent.attrs, file.attrs])
+    return arrays
 
 
 def hdf5_rate(file: Any, found: Mapping[str, Any], skipped: list[str]) -> Iterator[tuple[str, Any]]:

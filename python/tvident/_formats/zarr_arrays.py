@@ -17,7 +17,7 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     import zarr  # noqa: PLC0415 - an extra
 
     opened: Any = zarr.open(path, mode="r")
-    found = _found(opened)
+    found = zarr_found(opened)
     yield from _rate(opened, found, skipped)
     for name, (array, attributes) in found.items():
         if np.dtype(array.dtype).kind not in "biufc" and not np.dtype(array.dtype).names:
@@ -39,14 +39,14 @@ def variables(path: str, skipped: list[str]) -> Iterator[tuple[str, Any]]:
 
 def zarr_rate(opened: Any, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     """Give the sample rate in the attributes of an array or group that is open, or else of the arrays and groups inside."""
-    yield from _rate(opened, _found(opened), skipped)
+    yield from _rate(opened, zarr_found(opened), skipped)
 
 
 def _rate(opened: Any, found: _Found, skipped: list[str]) -> Iterator[tuple[str, Any]]:
     yield from rate_channel(dict(opened.attrs), [one for _, each in found.values() for one in each], skipped)
 
 
-def _found(opened: Any) -> _Found:
+def zarr_found(opened: Any) -> _Found:
     """Return all arrays by their paths with dots, with their attributes and those of the groups that they are in."""
     import zarr  # noqa: PLC0415 - an extra
 

@@ -21,14 +21,10 @@ from tvident._files import (
     printable,
     without_marks,
 )
-from tvident._formats import hdf5_rate, zarr_rate
+from tvident._formats import columns_of, datasets, hdf5_arrays, hdf5_rate, zarr_found, zarr_rate
 from tvident._in_pieces.file_rows import ColumnOfRows, RowsOfFile, SourceChannel, opened_by_h5py
 from tvident._in_pieces.said import NOTHING_SAID, SaidOfRate, said_of_rate
-from tvident._units import named_unit, with_unit
-
-_UNITS = ("unit", "units", "Unit", "Units", "UNITS")
-_COLUMNS = ("columns", "column_names", "channels", "channel_names", "names", "labels")
-"""Attributes that list the columns of a matrix."""
+from tvident._units import named_unit
 
 
 @dataclass(frozen=True)
@@ -112,6 +108,17 @@ class _OfArray:
         return np.asarray(self.array[self.place, first:end] if self.is_row else self.array[first:end, self.place])
 
 
+@dataclass(frozen=True)
+class _FieldOfArray:
+    """A field of a vector of structures."""
+
+    array: Any
+    field: str
+
+    def read(self, first: int, end: int) -> npt.NDArray[Any]:
+        return np.asarray(self.array[first:end][self.field])
+
+
 def _npy(path: Path) -> Source:
     with path.open("rb") as file:
         version = np.lib.format.read_magic(file)
@@ -161,15 +168,12 @@ def _parquet(path: Path) -> Source:
 
 def _hdf5(path: Path) -> Source:
     file = opened_by_h5py(path, "HDF5")
-    found: dict[str, Any] = {}
+    import h5py  # noqa: PLC0415 - an extra
 
-    def note(name: str, one: Any) -> None:
-        if hasattr(one, "shape"):  # groups have none
-            found[name.replace("/", ".")] = one
-
-    file.visititems(note)
-    said = said_of_rate(lambda remarks: hdf5_rate(file, found, remarks), _single(found))
-    return replace(_source(path, _of_arrays(found), file.close), said=said)
+    found = dict(datasets(file, "", h5py))
+    arrays = hdf5_arrays(file, found)
+    said = said_of_rate(lambda remarks: hdf5_rate(file, found, remarks), _single(arrays))
+    return replace(_source(path, _of_arrays(arrays), file.close), said=said)
 
 
 def _netcdf(path: Path) -> Source:
@@ -192,60 +196,45 @@ def _zarr(path: Path) -> Source:
         raise FileError(
             f"{printable(path)}: must be a Zarr group or array; zarr says: {printable(error, 200)}"
         ) from None
-    members = [("", opened)] if isinstance(opened, zarr.Array) else opened.members(max_depth=None)
-    found = {name.replace("/", "."): one for name, one in members if isinstance(one, zarr.Array)}
+    found = {name or "0": one for name, one in zarr_found(opened).items()}
     said = said_of_rate(lambda remarks: zarr_rate(opened, remarks), _single(found))
     return replace(_source(path, _of_arrays(found)), said=said)
 
 
-def _of_arrays(found: Mapping[str, Any]) -> dict[str, tuple[SourceChannel, int]]:
-    """Return the channels of arrays with attributes: vectors, and columns of matrices."""
+_Arrays = Mapping[str, tuple[Any, Sequence[Mapping[str, Any]]]]
+"""Arrays by their names, with attributes: their own, then those of what they are in."""
+
+
+def _of_arrays(found: _Arrays) -> dict[str, tuple[SourceChannel, int]]:
+    """Return the channels of arrays with attributes, called as in memory: vectors, columns of matrices, fields of structures."""
     channels: dict[str, tuple[SourceChannel, int]] = {}
-    for name, array in found.items():
-        if array.dtype.kind not in "iuf" or not array.shape:
+    for name, (array, attributes) in found.items():
+        if not array.shape:
             continue
-        units = _units_of(array)
-        if array.ndim == 1:
-            channels[with_unit(name or "0", units[0] if len(units) == 1 else "")] = (_OfArray(array), array.shape[0])
-        elif array.ndim == 2:  # noqa: PLR2004 - samples and channels
-            names, is_row = _names_in_matrix(array)
-            count = len(names)
-            units = units if len(units) == count else units[:1] * count if len(units) == 1 else [""] * count
-            for place, (called, unit) in enumerate(zip(names, units, strict=True)):
-                full = with_unit(name if name and 1 in array.shape else f"{name}.{called}".lstrip("."), unit)
-                channels[full] = (_OfArray(array, place, is_row), max(array.shape))
+        fields = [
+            one for one in array.dtype.names or () if array.dtype[one].kind in "iuf" and not array.dtype[one].shape
+        ]
+        if array.ndim == 1 and fields:
+            channels |= {f"{name}.{one}": (_FieldOfArray(array, one), array.shape[0]) for one in fields}
+        elif array.dtype.kind in "iuf" and array.ndim == 1:
+            channels[columns_of(name, array, attributes)[0]] = (_OfArray(array), array.shape[0])
+        elif array.dtype.kind in "iuf" and array.ndim == 2:  # noqa: PLR2004 - samples and channels
+            names, count = columns_of(name, array, attributes), min(array.shape)
+            if len(names) == 1 < count:
+                names = [f"{name}.{place}" for place in range(count)]
+            is_row = array.shape[1] != len(names)
+            for place, called in enumerate(names):
+                channels[called] = (_OfArray(array, place, is_row), max(array.shape))
     return channels
 
 
-def _units_of(array: Any) -> list[str]:
-    said = next((array.attrs[one] for one in _UNITS if one in array.attrs), "")
-    return [_text(one) for one in np.ravel(said).tolist()]
-
-
-def _single(found: Mapping[str, Any]) -> dict[str, Any]:
+def _single(found: _Arrays) -> dict[str, Any]:
     """Return single numbers by their names with units."""
     return {
-        with_unit(name, units[0] if len(units := _units_of(array)) == 1 else ""): np.asarray(array[()])
-        for name, array in found.items()
+        columns_of(name, array, attributes)[0]: np.asarray(array[()])
+        for name, (array, attributes) in found.items()
         if array.shape is not None and array.dtype.kind in "iuf" and math.prod(array.shape) == 1
     }
-
-
-def _names_in_matrix(array: Any) -> tuple[list[str], bool]:
-    """Return the names of the channels of a matrix, as an attribute of it lists them, or their numbers; and whether these are rows.
-
-    Where nothing names either, channels are fewer than samples.
-    """
-    for key in _COLUMNS:
-        names = [_text(one) for one in np.ravel(array.attrs.get(key, ())).tolist()]
-        if len(set(names)) == len(names) in array.shape and all(names):
-            return names, array.shape[1] != len(names)
-    rows, columns = array.shape
-    return list(map(str, range(min(rows, columns)))), rows < columns
-
-
-def _text(one: object) -> str:
-    return one.decode(errors="replace") if isinstance(one, bytes) else str(one)
 
 
 def _source(
