@@ -44,7 +44,7 @@ def test_a_simulated_recording_is_the_librarys(recording: Path) -> None:
 def test_info_lists_the_channels(recording: Path) -> None:
     done = run("info", recording)
     assert done.returncode == 0
-    assert "uniform: 1000 per unit" in done.stdout
+    assert "uniform: 1000 Hz" in done.stdout
     assert "angle [rad]" in done.stdout
 
 

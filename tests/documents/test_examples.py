@@ -90,7 +90,7 @@ def test_own_file(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_from_the_shell(tmp_path: Path) -> None:
     printed = run("from_the_shell.sh", tmp_path)
-    assert "uniform: 1000 per unit" in printed
+    assert "uniform: 1000 Hz" in printed
     time, stiffness, error = map(float, printed.splitlines()[-1].split(","))
     assert time == pytest.approx(9.9)
     assert 10 < stiffness < 20

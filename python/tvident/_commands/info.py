@@ -70,7 +70,7 @@ def _remark(name: str, values: npt.NDArray[Any]) -> str:
             period = (values[-1] - values[0]) / steps.size
             grid = values[0] + period * np.arange(values.size)
             if np.abs(values - grid).max() <= 1e-3 * period:
-                return f"uniform: {1 / period:.6g} per unit{_in_hertz(name, period)}"
+                return f"uniform: {_rate(name, period)}"
             return _steps(name, values)
     if steps.size and not steps.any():
         return "constant"
@@ -95,12 +95,12 @@ def _is_time(name: str) -> bool:
     return unit is not None and unit.dimension == ROTARY.dimensions["time"]
 
 
-def _in_hertz(name: str, period: float) -> str:
-    """Return the sample rate of a channel whose unit is one of time."""
+def _rate(name: str, period: float) -> str:
+    """Return the sample rate of a channel: in Hz where its unit is one of time."""
     unit = unit_of(named_unit(name)[1])
     if unit is None or not _is_time(name):
-        return ""
-    return f", {1 / (period * unit.factor):.6g} Hz"
+        return f"{1 / period:.6g} per unit"
+    return f"{1 / (period * unit.factor):.6g} Hz"
 
 
 def _steps(name: str, times: npt.NDArray[np.float64]) -> str:
@@ -115,9 +115,9 @@ def _steps(name: str, times: npt.NDArray[np.float64]) -> str:
         except ValueError:
             pass
         else:  # of few digits
-            return f"uniform within its digits: {1 / period:.6g} per unit{_in_hertz(name, period)}"
+            return f"uniform within its digits: {_rate(name, period)}"
     gaps = int(np.count_nonzero(np.diff(grid.places) > grid.bridged))
-    words = f"increasing: {1 / grid.period:.6g} per unit{_in_hertz(name, grid.period)}"
+    words = f"increasing: {_rate(name, grid.period)}"
     if grid.jitter:
         words += f", steps scatter by {grid.jitter:.2g} of a step"
     elif grid.samples > times.size:
