@@ -242,9 +242,13 @@
   }
 
   // A number stays on one line with its sign and its percent.
-  const together = (text) => text.replaceAll("± ", "±\u00a0").replaceAll(" %", "\u00a0%");
+  function together(made, text) {
+    const parts = text.split(/(± \S+(?: %)?|\S+ %)/);
+    made.replaceChildren(...parts.map((part, place) => (place % 2 ? element("span", part, "together") : part)));
+    return made;
+  }
 
-  const sentence = (text) => together(text.charAt(0).toUpperCase() + text.slice(1) + (/[.?!]$/.test(text) ? "" : "."));
+  const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1) + (/[.?!]$/.test(text) ? "" : ".");
 
   function timeButton(from, to) {
     const round = (value) => Number(value.toFixed(3));
@@ -262,7 +266,7 @@
   function write() {
     byId("verdict").classList.add(content.tone);
     const verdict = byId("verdict").lastElementChild;
-    verdict.textContent = together(verdict.textContent);
+    together(verdict, verdict.textContent);
     byId("sign").textContent = { good: "✓", doubtful: "!", bad: "✕" }[content.tone];
     const first = content.series[0];
     if (first) byId("facts").textContent = content.facts ?? `${first.count.toLocaleString("en").replaceAll(",", "\u202f")} samples, ${Number((END - START).toPrecision(4))} s`;
@@ -276,7 +280,7 @@
       byId("numbers").append(card);
     }
     byId("advice").hidden = !content.advice.length;
-    for (const words of content.advice) byId("advice-list").append(element("li", sentence(words)));
+    for (const words of content.advice) byId("advice-list").append(together(element("li"), sentence(words)));
     byId("warnings").hidden = !content.warnings.length && !content.jumps.length;
     for (const one of content.warnings) {
       const card = element("div", undefined, "warning");
