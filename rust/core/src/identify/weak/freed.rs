@@ -8,7 +8,6 @@ use crate::identify::weak::choice::Chosen;
 use crate::identify::weak::decide::{BADLY, BETTER};
 use crate::identify::weak::decided::Decided;
 use crate::identify::weak::session::Session;
-use crate::identify::weak::swings::HOPELESS;
 use crate::inference::constancy::Test;
 use crate::inference::part_constants::TestNoise;
 use crate::inference::short_parts::{MORE_THAN_NOISE, Swinging, swinging};
@@ -30,6 +29,9 @@ const LEFT_IN_WINDOWS: f64 = 0.15;
 
 /// Of what several constants together leave, one of them may seem to leave less by this factor: their curves differ.
 pub(crate) const NO_LESS: f64 = 1.5;
+
+/// The part that is left after the first round of a search where [`EXPLAINED`] may be left in the end, from which on others come to nothing.
+const COMES_TO_NOTHING: f64 = 0.7;
 
 /// Where constants jump, those that do not change in between stand unless others predict so much better.
 const SIMPLER: f64 = 0.98;
@@ -90,7 +92,8 @@ impl Session<'_, '_, '_> {
         let all_free = all.map(|all| self.freed(rows, model, decided, (all, hopeless(decided)))).transpose()?;
         let mut best: Option<Decided> = None;
         // Swings must leave less than what is asked here.
-        if let Some(all) = all.filter(|_| all_free.as_ref().is_some_and(|free| free.error >= NO_LESS * most)) {
+        let explain_nothing = |free: &Decided| free.fit.is_some() && free.error >= NO_LESS * most;
+        if let Some(all) = all.filter(|_| all_free.as_ref().is_some_and(explain_nothing)) {
             in_vain.push(all.to_vec());
             return Ok(false);
         }
@@ -298,7 +301,7 @@ impl Session<'_, '_, '_> {
 
 /// The error after the first round of a search from which on it is not worth another: only where constants must explain most of what is left.
 fn hopeless(decided: &Decided) -> f64 {
-    if decided.is_lost() { HOPELESS * decided.error } else { f64::INFINITY }
+    if decided.is_lost() { COMES_TO_NOTHING * decided.error } else { f64::INFINITY }
 }
 
 /// Rows in which the rate of a coefficient that was given as constant, for which they have no column, makes nothing: good enough to tell whether it

@@ -17,7 +17,7 @@ use crate::regression::subsample::{holds, places_of, stretches_of_rows, thinned_
 use crate::regression::window_length::Scale;
 
 /// The part that is left after the first round of a search, from which on it is not worth another.
-pub(crate) const HOPELESS: f64 = 0.5;
+const HOPELESS: f64 = 0.5;
 
 impl Session<'_, '_, '_> {
     /// Sets a constant free that swings, if that leaves hardly more than noise: whatever is missing from an equation follows a curve a little. Where rows
@@ -43,7 +43,7 @@ impl Session<'_, '_, '_> {
             }
             // Where all leave too much, one of them does.
             let Some(free) = self.swinging_freed(&rows, model, decided, &undecided)? else { return Ok(false) };
-            if !leaves_little(decided, &free, NO_LESS) {
+            if free.fit.is_some() && !leaves_little(decided, &free, NO_LESS) {
                 return Ok(false);
             }
             explained = Some(free).filter(|free| is_explained(decided, free));
