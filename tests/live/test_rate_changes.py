@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 
 from live.test_losses import COUNT, Numbers, Stamps, clocked, sent, without
+from tvident._live import LiveClock
 
 CHANGES = 6000
 """The sample at which the rate changes."""
+
+TWO_LOOKS = 2 * (512 + 1)
+"""Samples that are looked at, and those of the look before."""
 
 
 def changed(rate: float, block: int, kept: Numbers, late: float = 2e-4) -> Stamps:
@@ -62,6 +66,7 @@ def test_samples_that_are_lost_at_random_are_no_change(block: int, late: float, 
     kept = np.flatnonzero((generator.random(COUNT) > share) | (np.arange(COUNT) < CHANGES))
     clock, _ = clocked(sent(kept, block, late), kept)
     assert not clock.changes
+    assert not clock.thinned
     assert clock.mistaken == 0
 
 
@@ -78,3 +83,47 @@ def test_what_late_buffers_hide_is_said(share: float) -> None:
     assert not clock.warning or f"unless {clock.hidden} samples more are lost than are counted" in clock.warning
     clock, _ = clocked(sent(without(), 64, 3e-3), without())
     assert (clock.lost, clock.hidden) == (0, 0)
+
+
+@pytest.mark.parametrize(
+    ("turns", "which"), [(2, "every second sample is"), (3, "2 of 3 samples are"), (4, "3 of 4 samples are")]
+)
+def test_a_part_of_the_rate_may_be_losses_and_is_said_once(turns: int, which: str) -> None:
+    """Looks were not ended: lists grew, a sample took 2 ms and more with each, and nothing was said."""
+    kept = np.concatenate([np.arange(CHANGES), np.arange(CHANGES, 2 * COUNT, turns)])
+    clock, _ = clocked(kept * 1e-3 + np.random.default_rng(6).exponential(2e-5, kept.size), kept)
+    words = "\n".join(clock.words())
+    assert words.count(f"the rate seems to be {1000 / turns:.4g} Hz, or {which} lost") == 1
+    assert clock.warning == clock.thinned
+    assert float(clock.warning.split()[1]) == pytest.approx(CHANGES * 1e-3, abs=0.1)
+    # Sixteen samples wait at the change and at the end.
+    assert clock.lost == pytest.approx((2 * COUNT - CHANGES) * (turns - 1) / turns, abs=16 * (turns - 1))
+    assert not clock.changes
+    assert max(kept_of(clock)) <= TWO_LOOKS
+
+
+def kept_of(clock: LiveClock) -> tuple[int, int]:
+    """Return how many samples, and how many losses or repetitions, a clock keeps to look at."""
+    looks = clock._looks  # noqa: SLF001 - nothing else shows what is kept
+    samples, taken_for = len(looks._latest) + len(looks._before), len(looks._taken_for)  # noqa: SLF001
+    return samples, taken_for
+
+
+@pytest.mark.parametrize("rate", [880.0, 1200.0])
+def test_nothing_is_kept_for_looks_that_have_ended(rate: float) -> None:
+    """Once a nominal rate shows as a mistake none is sought, but what was taken for lost was kept for ever."""
+    kept = np.arange(5 * COUNT)
+    clock, _ = clocked(changed(rate, 1, kept), kept)
+    assert clock.lost + clock.repeated > TWO_LOOKS
+    assert max(kept_of(clock)) <= TWO_LOOKS
+
+
+def test_what_was_not_counted_is_not_taken_back() -> None:
+    """A first buffer that came late makes all others early: nothing is counted as repeated, so nothing of it can be taken back."""
+    stamps = sent(without(), 20, 2e-5)
+    stamps[:20] += 5e-3
+    clock = LiveClock(1e-3)
+    for place, stamp in enumerate(stamps[:700].tolist()):
+        clock.rows((stamp, float(place), 0.0))
+    assert (clock.lost, clock.repeated) == (0, 0)
+    assert kept_of(clock)[1] == 0

@@ -69,16 +69,17 @@ class Looks:
 
         Stamps scatter by so many seconds.
         """
+        if self._is_over:
+            # Whatever it showed: what became of that is not known here.
+            self._before, self._latest = self._latest, []
+            self._taken_for = [one for one in self._taken_for if one[0] >= self._before[0][0]]
         self._latest.append((number, stamp))
-        if number - self._latest[0][0] < _LOOK or len(self._latest) < BUFFERS_THAT_SAY:
-            return known
-        if len(self._taken_for) >= _AGAIN:
-            shown = self._shown(known, scatter)
-            if shown != known:
-                return shown
-        self._before, self._latest = self._latest, []
-        self._taken_for = [one for one in self._taken_for if one[0] >= self._before[0][0]]
-        return known
+        return self._shown(known, scatter) if self._is_over and len(self._taken_for) >= _AGAIN else known
+
+    @property
+    def _is_over(self) -> bool:
+        """Whether the look that goes on has all its samples."""
+        return len(self._latest) >= BUFFERS_THAT_SAY and self._latest[-1][0] - self._latest[0][0] >= _LOOK
 
     def _shown(self, known: float, scatter: float) -> float:
         """Return the period that explains the latest samples better than what was taken for lost; else the known one."""

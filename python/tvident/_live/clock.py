@@ -159,9 +159,13 @@ class LiveClock(ClockCounts):
         known = self._seconds()
         period = self._looks.see(self._came + len(self._waiting.came), stamp, known, self.rate.scatter)
         periods = period / self._period
-        if period == known or (periods > 1 + HALF and abs(periods - round(periods)) < WHOLE):
+        if period == known:
             return []
         begin, lost, repeated = self._looks.since(period)
+        if periods > 1 + HALF and abs(periods - round(periods)) < WHOLE:
+            # Stamps are the same where samples are lost by turns.
+            self._thinned = self._thinned or RateChange(begin, known, period)
+            return []
         if abs(period - self._period) >= NO_MISTAKE * self._period:
             # What is taken for lost, or repeated, keeps windows from samples that are up to half a step from their times.
             self._other = period
@@ -264,8 +268,6 @@ class LiveClock(ClockCounts):
             off = min(waiting.earliest, waiting.latest, key=abs)
         by = math.floor(off + HALF)
         first = waiting.came[0]
-        if by:
-            self._looks.took_for_lost(self._came, by)
         if by > _MOST_LOST or (by > 0 and self._has_returned()):
             found += self._jumped(first.row[0])
         elif by < 0 and self._came <= 2 * self._buffers.latest:
@@ -273,11 +275,13 @@ class LiveClock(ClockCounts):
             self._expected += by * self._seconds()
             self._lateness = Lateness()
         elif by < 0:
+            self._note_taken_for(by)
             self.repeated -= by
             self._next += by
             self._expected += by * self._seconds()
             found.append(_apart(first.row[0]))
         elif by > 0:
+            self._note_taken_for(by)
             found += self._gap(by)
             self._leave_out_unsure()
         offs = enumerate(
@@ -285,6 +289,11 @@ class LiveClock(ClockCounts):
         )
         due = [place for place, off in offs if abs(off) < HALF]
         return [*found, *self._taken_first(due[-1] + 1 if due else len(waiting.came))]
+
+    def _note_taken_for(self, by: int) -> None:
+        """Note that so many samples are counted as lost, or repeated, which may be another rate."""
+        if self._other == self._period:
+            self._looks.took_for_lost(self._came, by)
 
     def _has_returned(self) -> bool:
         """Return whether those that wait have stamps of the clock as it was before it was set."""

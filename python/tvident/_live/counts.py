@@ -57,6 +57,8 @@ class ClockCounts:
         self._came = self._stamped = self._same = self._of_earlier_clock = 0
         self._has_buffers = False
         self.changes: list[RateChange] = []
+        self._thinned: RateChange | None = None
+        """To a whole number of nominal periods, which lost samples explain as well."""
         self.mistaken = 0
         self.lost = self.repeated = self.jumps = self.back = self.twice = self.empty = self.unsure = 0
 
@@ -118,9 +120,22 @@ class ClockCounts:
         return said
 
     @property
+    def thinned(self) -> str:
+        """What to say where the rate became a half, a third, ... of the nominal one, or samples are lost by turns; nothing elsewhere."""
+        change = self._thinned
+        if change is None:
+            return ""
+        turns = round(change.after / self._period)
+        which = "every second sample is" if turns == 2 else f"{turns - 1} of {turns} samples are"  # noqa: PLR2004 - a half
+        return (
+            f"from {change.stamp:.1f} s on the rate seems to be {1 / change.after:.4g} Hz, or {which} lost: "
+            f"counted as lost; if it is the rate, give --sample-rate {1 / change.after:.4g} from there on"
+        )
+
+    @property
     def warning(self) -> str:
         """What must be said while the session runs."""
-        return self.comes_faster or self.comes_slower or self.changed or self.differs
+        return self.comes_faster or self.comes_slower or self.thinned or self.changed or self.differs
 
     def words(self) -> list[str]:
         """Return what there is to say of the clock."""
@@ -163,6 +178,8 @@ class ClockCounts:
         if self.comes_slower:
             return ["lost samples: not known at another rate than the nominal one"]
         said = [f"lost samples: {self.lost}"]
+        if self.thinned:
+            said.append(self.thinned)
         if self.hidden:
             said.append(
                 f"stamps come {1000 * self.rate.scatter:.2g} ms late and early, so that samples lost one by one look like a slower "
