@@ -7,6 +7,7 @@ import pytest
 
 from live.test_losses import COUNT, Numbers, Stamps, clocked, sent, without
 from tvident._live import LiveClock
+from tvident._live.changes import Stretches
 
 CHANGES = 6000
 """The sample at which the rate changes."""
@@ -23,6 +24,16 @@ def changed(rate: float, block: int, kept: Numbers, late: float = 2e-4) -> Stamp
         return taken + generator.exponential(late / 10, kept.size)
     last: Numbers = np.minimum((np.arange(kept.size) // block + 1) * block, kept.size) - 1
     return taken[last] + generator.exponential(late, kept.size)[last] - (last - np.arange(kept.size)) * 1e-3
+
+
+def test_the_rate_after_a_change_has_a_base_of_its_own() -> None:
+    """What the session's own rate sees later would be in the base twice, and its error too small by half."""
+    stretches = Stretches()
+    stamps = changed(990.0, 1, without())
+    found = next(found for number, stamp in enumerate(stamps) if (found := stretches.see(number, stamp)) is not None)
+    count = stretches.base.count
+    found[1].see(0.0, 0.0)
+    assert stretches.base.count == count > 0
 
 
 @pytest.mark.parametrize("rate", [950.0, 990.0, 1010.0, 1050.0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import statistics
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -115,7 +115,7 @@ class Looks:
 class Stretches:
     """Compares the rate of two stretches with that of all samples before: a change that the clock follows shows nowhere else."""
 
-    _base: Rate = field(default_factory=Rate)
+    base: Rate = field(default_factory=Rate)
     """Of the samples before the latest stretches."""
     _latest: list[Point] = field(default_factory=list)
     _before: list[Point] = field(default_factory=list)
@@ -126,14 +126,15 @@ class Stretches:
         if stamp - self._latest[0][1] < _STRETCH or len(self._latest) < _FEW:
             return None
         latest, before = (_line(points) for points in (self._latest, self._before))
-        is_other = _differ(self._base, latest) and _differ(self._base, before) and not _differ(before, latest)
+        is_other = _differ(self.base, latest) and _differ(self.base, before) and not _differ(before, latest)
         if is_other:
             after = _line([*self._before, *self._latest])
-            change = RateChange(self._before[0][1], self._base.period, after.period)
-            self._base, self._before, self._latest = after, [], []
-            return change, after
+            change = RateChange(self._before[0][1], self.base.period, after.period)
+            self.base, self._before, self._latest = after, [], []
+            # The base must not see what the clock's own rate will.
+            return change, replace(after)
         for point in self._before:
-            self._base.see(*point)
+            self.base.see(*point)
         self._before, self._latest = self._latest, []
         return None
 
