@@ -55,16 +55,16 @@ def test_rows_of_statistics_are_no_samples(
     assert {one["samples"] for one in json.loads(done.stdout)["channels"]} == {len(rows)}
 
 
-def test_means_beside_no_times_and_an_empty_cell_are_none_either(tmp_path: Path) -> None:
+def test_means_below_an_empty_cell_of_the_times_are_none_either(tmp_path: Path) -> None:
     rows = np.round(COLUMNS, 5)
     path = tmp_path / "run.csv"
     mean = ",".join(("", *_text(rows[:, 1:].mean(axis=0)[None])))
     path.write_text("\n".join(["time [s],angle [deg],torque [N m]", *_text(rows), mean]))
     with pytest.warns(recordings.FileWarning, match="the last row holds the mean"):
         assert recordings.read(path)["angle [deg]"].size == len(rows)
+    # Without times nothing tells such a row from a sample.
     path.write_text("\n".join(["angle [deg],torque [N m]", *_text(rows[:, 1:]), mean[1:]]))
-    with pytest.warns(recordings.FileWarning, match="the last row holds the mean"):
-        assert recordings.read(path)["angle [deg]"].size == len(rows)
+    assert recordings.read(path)["angle [deg]"].size == len(rows) + 1
 
 
 def _slow_ramp() -> npt.NDArray[Any]:
@@ -77,6 +77,12 @@ def _rests_at_its_mean() -> npt.NDArray[Any]:
     return np.concatenate([rise, np.zeros((100, 2))])
 
 
+def _ends_at_its_mean() -> npt.NDArray[Any]:
+    """Zeros are written with any digits, and two sines that end there have both means."""
+    turns = np.arange(1, 1001) * 2 * np.pi / 100
+    return np.round(np.stack([30 * np.sin(turns), 150 * np.sin(2 * turns)], axis=1), 2) + 0.0
+
+
 def _random(seed: int, digits: int) -> npt.NDArray[Any]:
     return np.round(np.random.default_rng(seed).normal(size=(400, 2)), digits)
 
@@ -86,6 +92,7 @@ def _random(seed: int, digits: int) -> npt.NDArray[Any]:
     [
         _slow_ramp(),
         _rests_at_its_mean(),
+        _ends_at_its_mean(),
         np.zeros((50, 3)),
         np.ones((50, 2)),
         *(_random(seed, 0) for seed in range(20)),

@@ -25,11 +25,16 @@ _MOST_DIGITS = 17
 
 
 def without_statistics(columns: npt.NDArray[np.float64], say: Say) -> npt.NDArray[np.float64]:
-    """Return columns, shape (columns, samples), without the last rows where each holds one statistic of all rows above, which is said."""
+    """Return columns, shape (columns, samples), without the last rows where each holds one statistic of all rows above, which is said.
+
+    Only behind times that go on up to there and no further: where no column tells it, the last sample may be near the mean of all.
+    """
     samples = columns.shape[1]
     if samples <= _FEWEST_SAMPLES or not _may_hold(columns):
         return columns
     for rows in range(min(_MOST, samples - _FEWEST_SAMPLES), 0, -1):
+        if not _times_end(columns, rows):
+            continue
         above, names = columns[:, :-rows], []
         for place in range(samples - rows, samples):
             names.append(_statistic(above, columns[:, place]))
@@ -41,6 +46,13 @@ def without_statistics(columns: npt.NDArray[np.float64], say: Say) -> npt.NDArra
             say(f"{said} the {', '.join(names)} of the rows above: not read, as no samples")
             return above
     return columns
+
+
+def _times_end(columns: npt.NDArray[np.float64], rows: int) -> bool:
+    """Return whether a column increases up to the last rows, as times do, and not from there to the first of them."""
+    above, first = columns[:, :-rows], columns[:, -rows]
+    is_clock = np.array([bool((np.diff(column) > 0).all()) for column in above])
+    return bool((is_clock & ~(first > above[:, -1])).any())
 
 
 def _may_hold(columns: npt.NDArray[np.float64]) -> bool:

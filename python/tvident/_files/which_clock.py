@@ -18,7 +18,6 @@ _NUMBERED = re.compile(r"[\s_.]*\d+$")
 _ALIKE = 0.01
 """Of a step: clocks of groups that were sampled together differ by rounding."""
 
-
 _OF_UNITS = (1e3, 1e6, 1e9, 60.0, 3600.0, 86400.0)
 """By which times without a unit differ from seconds: milliseconds to days."""
 
