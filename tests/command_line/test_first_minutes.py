@@ -154,6 +154,10 @@ def test_a_member_of_a_structure_is_found_by_the_name_that_it_is_listed_with() -
     np.savez("bare.npz", **channels)
     asked = run("identify", "bare.npz", "--angle", "angle", "--torque", "torque")
     assert "it may be --sample-rate 500, as fs [kHz] says" in asked.stderr
+    np.savez("bare.npz", **channels | {"dt": 0.001})
+    asked = run("identify", "bare.npz", "--angle", "angle", "--torque", "torque")
+    assert "dt says 1000 Hz: give --sample-rate with the right one" in asked.stderr
+    assert "it may be" not in asked.stderr
     said: dict[str, Any] = {"dt": 0.002, "Ts [ms]": 2.0, "trial.fs": np.array([500.0, 500.0])}
     for name, value in said.items():
         beside: dict[str, Any] = {"angle": np.ones(9), "torque": np.ones(9), name: value}

@@ -311,6 +311,21 @@ def test_json_is_known_from_a_pipe() -> None:
     assert "uniform: 500 per unit" in told.stdout
 
 
+def test_single_numbers_that_tell_different_rates_are_asked_about(tmp_path: Path) -> None:
+    """The first was taken without a word: twice the rate makes an inertia four times as small."""
+    path = tmp_path / "x.npz"
+    channels: dict[str, Any] = {"angle": np.sin(T), "torque": np.cos(T), "dt": 0.002, "fs": 1000.0}
+    np.savez(path, **channels)
+    with pytest.raises(ValueError, match=r"dt says 500 Hz and fs says 1000 Hz: give sample_rate= with the right one"):
+        assert tvident.read_recording(path).sample_rate
+    np.savez(path, **channels | {"fs": 500.0})
+    assert tvident.read_recording(path).sample_rate == pytest.approx(500)
+    # Of times beside them nobody knows which they bear out.
+    np.savez(path, **channels | {"time [s]": T})
+    with pytest.raises(ValueError, match="dt says 500 Hz and fs says 1000 Hz"):
+        assert tvident.read_recording(path).sample_rate
+
+
 @pytest.mark.parametrize(("name", "number"), [("fs", 500.0), ("dt", 0.002), ("sample_rate [kHz]", 0.5)])
 def test_a_single_number_that_contradicts_the_times_is_said(tmp_path: Path, name: str, number: float) -> None:
     """The number was taken without a word: a logger that keeps every second sample makes the inertia four times as small."""

@@ -211,3 +211,15 @@ def test_a_clock_is_found_as_in_memory(tmp_path: Path, rig: Any) -> None:
         file["time_1"], file["time_2"] = rig.time, rig.time * 1.5
     with pytest.raises(TypeError, match=r"several channels of times \(time_1, time_2\); give sample_rate"):
         tvident.identify_file(path, tmp_path / "none.npy", **call)
+
+
+def test_single_numbers_that_differ_are_named(tmp_path: Path, rig: Any) -> None:
+    """The first was taken without a word, here and in memory."""
+    path = _of_period(tmp_path, rig)
+    with h5py.File(path, "a") as file:
+        file["fs"] = 2 * _RATE
+    with (
+        pytest.warns(recordings.FileWarning, match="dt says 500 Hz and fs says 1000 Hz: give sample_rate="),
+        pytest.raises(TypeError, match="needs the sample period"),
+    ):
+        tvident.identify_file(path, tmp_path / "out.npy", angle="angle", torque="torque")

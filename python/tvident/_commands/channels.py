@@ -18,6 +18,7 @@ import numpy.typing as npt
 from tvident import recordings
 from tvident._files import (
     FileRecording,
+    RatesDifferError,
     StatedRate,
     counters,
     ending_by,
@@ -103,6 +104,13 @@ def _counted_in(channels: recordings.Channels) -> str:
 
 def _rate_in(channels: recordings.Channels) -> str:
     """Return what to type where a single number of a file is called as a sample rate is; nothing elsewhere."""
+    single = {name: value for name, value in channels.items() if value.size == 1}
+    try:
+        FileRecording(single, source="the file").sample_rate  # noqa: B018 - whether numbers differ
+    except RatesDifferError as error:
+        return f"; {str(error).replace('sample_rate=', '--sample-rate')}"
+    except ValueError:
+        pass  # none tells it
     for name, value in channels.items():
         plain, unit = named_unit(name)
         bare = re.sub(r"[\s_.-]", "", plain.rpartition(".")[2]).casefold()

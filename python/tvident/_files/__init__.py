@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tvident._files.joints import joint_of
     from tvident._files.no_values import marks_given, without_marks
     from tvident._files.rates import other_rate
-    from tvident._files.recorded import FileRecording, read_recording, said_otherwise
+    from tvident._files.recorded import FileRecording, RatesDifferError, read_recording, said_otherwise
     from tvident._files.recordings import TEXT_ENDINGS, read
     from tvident._files.stated import StatedRate, stated_rate
     from tvident._files.text import copy_text, names_of_text
@@ -33,6 +33,7 @@ __all__ = [
     "FileError",
     "FileRecording",
     "FileWarning",
+    "RatesDifferError",
     "StatedRate",
     "aligned",
     "channel",
@@ -83,6 +84,7 @@ _READERS = {
     "other_rate": "rates",
     "without_marks": "no_values",
     "FileRecording": "recorded",
+    "RatesDifferError": "recorded",
     "read_recording": "recorded",
     "said_otherwise": "recorded",
     "read": "recordings",

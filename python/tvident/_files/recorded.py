@@ -47,6 +47,10 @@ _NOTABLE = 0.01
 
 
 @arguments.called_as("FileRecording({'angle [deg]': angle, 'torque [N m]': torque})")
+class RatesDifferError(ValueError):
+    """Single numbers of a file tell different sample rates."""
+
+
 class FileRecording(Mapping[str, Channel]):
     """A recording from a file: a mapping of names to channels, each an array with its unit.
 
@@ -140,7 +144,7 @@ class FileRecording(Mapping[str, Channel]):
         Raises
         ------
         ValueError
-            If the file says nothing, or its times are not uniform: the message says how to go on.
+            If the file says nothing, single numbers say different things, or its times are not uniform: the message says how to go on.
 
         See Also
         --------
@@ -149,10 +153,14 @@ class FileRecording(Mapping[str, Channel]):
         """
         if self._rate is not None:
             return float(self._rate)
-        for name, values in self._channels.items():
-            rate = _rate_of(name, values) if values.size == 1 else None
-            if rate is not None:
-                return rate
+        told = _told_rates(self._channels)
+        if _differ(told):
+            rates = " and ".join(f"{name} says {rate:.7g} Hz" for name, rate in told.items())
+            raise RatesDifferError(
+                f"single numbers must tell one sample rate; of {self._source} {rates}: give sample_rate= with the right one"
+            )
+        if told:
+            return next(iter(told.values()))
         time = self.time
         if time is None or time.size < 2:  # noqa: PLR2004 - a period has two ends
             several = increasing_times(self._channels)
@@ -286,6 +294,16 @@ class FileRecording(Mapping[str, Channel]):
         }
 
 
+def _told_rates(channels: Mapping[str, Channel]) -> dict[str, float]:
+    """Return the samples per second that single numbers say, by their names."""
+    told = {name: _rate_of(name, values) for name, values in channels.items() if values.size == 1}
+    return {name: rate for name, rate in told.items() if rate is not None}
+
+
+def _differ(told: Mapping[str, float]) -> bool:
+    return bool(told) and max(told.values()) > (1 + _NOTABLE) * min(told.values())
+
+
 def _rate_of(name: str, value: Channel) -> float | None:
     """Return the samples per second that a single number says, None where it is called otherwise or cannot be one."""
     bare, number = name.rpartition(".")[2], float(value.reshape(-1)[0])
@@ -368,14 +386,14 @@ def said_otherwise(path: Path, channels: Mapping[str, npt.NDArray[Any]]) -> str:
         shown = recording.sample_rate
     except ValueError:
         return ""
-    for name, values in FileRecording(channels).items():
-        rate = _rate_of(name, values) if values.size == 1 else None
-        if rate is not None:
-            clock = recording._clock()  # noqa: SLF001 - of this class
-            if not (clock is not None and clock.unit) and may_be_of_other_unit(shown / rate, _NOTABLE):
-                return ""
-            words = f"{printable(name, 40)} says {rate:.6g} Hz, which is used, and its times show {shown:.6g} Hz"
-            return "" if abs(shown / rate - 1) < _NOTABLE else f"{words}: check which is right"
+    told = _told_rates(FileRecording(channels))
+    # Where they differ the sample rate says so.
+    for name, rate in told.items() if not _differ(told) else ():
+        clock = recording._clock()  # noqa: SLF001 - of this class
+        if not (clock is not None and clock.unit) and may_be_of_other_unit(shown / rate, _NOTABLE):
+            return ""
+        words = f"{printable(name, 40)} says {rate:.6g} Hz, which is used, and its times show {shown:.6g} Hz"
+        return "" if abs(shown / rate - 1) < _NOTABLE else f"{words}: check which is right"
     stated = stated_rate(path)
     if stated is None or abs(shown / stated.rate - 1) < _NOTABLE:
         return ""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tvident._files import FileRecording
+from tvident._files import FileRecording, RatesDifferError
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,10 @@ def said_of_rate(attributes: Callable[[list[str]], Iterator[tuple[str, Any]]], s
     remarks: list[str] = []
     numbers = {**dict(attributes(remarks)), **single}
     try:
-        rate = FileRecording(numbers).sample_rate
+        rate = FileRecording(numbers, source="the file").sample_rate
+    except RatesDifferError as error:
+        rate = None
+        remarks.append(str(error))
     except ValueError:
         rate = None
     return SaidOfRate(rate, tuple(map(str, remarks)))
