@@ -154,7 +154,7 @@ fn curves(
 /// Estimates them with bandwidths that are compared in one way. The curve of the first round is known.
 fn find_by(
     (search, compared): (&SlowSearch<'_>, PredictedBy),
-    (mut scale, mut begun): (Scale, Option<BestCurve>),
+    (mut scale, first): (Scale, Option<BestCurve>),
     stages: &mut Stages<'_, '_>,
 ) -> Result<Option<SlowCoefficients>, Error> {
     let &SlowSearch { rows, model, coefficients, noise, scales, .. } = search;
@@ -162,18 +162,14 @@ fn find_by(
     let rest = Model { constant: rest.to_vec(), ..model.clone() };
     let mut most = most_rows(search);
     let mut found: Option<SlowCoefficients> = None;
-    let (mut last, mut without_near): (Option<f64>, Option<(Varying, f64)>) = (None, None);
+    let mut without_near: Option<(Varying, f64)> = None;
     let mut few = FewRows::of(rows, scales);
+    let mut next = first;
     for round in 1.. {
         let before = found.as_ref().map(|found| found.error);
-        let best = if round == 1 {
-            begun.take()
-        } else {
-            curves(search, (found.as_ref(), scale, last), &[compared], stages)?.pop()
-        };
-        let Some(BestCurve { terms, curves: [leave_gap_out, varying], reach, excess }) = best else { return Ok(None) };
+        let Some(BestCurve { terms, curves: [leave_gap_out, varying], reach, excess }) = next else { return Ok(None) };
         let reach = reach.min(rows.len() as f64 / 2.0);
-        last = (terms > 1).then_some(reach);
+        let last = (terms > 1).then_some(reach);
         if last.is_some() && last == reaches(search, scale).first().copied() {
             // Shorter bandwidths need shorter windows.
             most = most.min(scale.span() / 2);
@@ -211,6 +207,7 @@ fn find_by(
             break;
         }
         scale = search.next_length(best, most, model.layout());
+        next = curves(search, (found.as_ref(), scale, last), &[compared], stages)?.pop();
     }
     if let (Some(found), Some(curve)) = (&mut found, without_near)
         && !rows.jumps.is_empty()

@@ -56,7 +56,7 @@ impl Session<'_, '_, '_> {
         decided.longest = swinging.as_ref().and_then(|one| one.longest);
         if let Some(growing) = growing {
             let free = self.freed(rows, model, decided, (&[growing], hopeless(decided)))?;
-            let most = if decided.error < NOISE_MODEL_FAILS { FAR_BETTER } else { EXPLAINED };
+            let most = if decided.is_lost() { EXPLAINED } else { FAR_BETTER };
             if free.error < most * decided.error {
                 *decided = free;
                 return Ok(true);
