@@ -13,7 +13,7 @@ from tvident._clocks import grid_of
 from tvident._commands import plain
 from tvident._commands.channels import channels_in, stated_in
 from tvident._files import aligned, increasing_times, printable, time_channels
-from tvident._units import ROTARY, named_unit, unit_of, unit_said
+from tvident._units import ROTARY, is_convertible, named_unit, unit_of, unit_said
 
 _SELDOM = 0.5
 """Steps of a clock that do not go on."""
@@ -91,8 +91,7 @@ def _turns(name: str, steps: npt.NDArray[np.float64]) -> str:
 
 
 def _is_time(name: str) -> bool:
-    unit = unit_of(named_unit(name)[1])
-    return unit is not None and unit.dimension == ROTARY.dimensions["time"]
+    return is_convertible(ROTARY, "time", named_unit(name)[1])
 
 
 def _rate(name: str, period: float) -> str:

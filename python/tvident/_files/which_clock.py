@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident import _arguments as arguments
-from tvident._units import ROTARY, Channel, UnitError, named_unit, times_in_seconds, unit_of, unit_said
+from tvident._units import ROTARY, Channel, UnitError, is_convertible, named_unit, times_in_seconds, unit_said
 
 _NUMBERED = re.compile(r"[\s_.]*\d+$")
 """What tells clocks of one name apart, as time_2 and t1."""
@@ -43,8 +43,7 @@ def increasing_times(channels: Mapping[str, npt.NDArray[Any]]) -> list[str]:
     """Return the names of channels in a unit of time that increase from sample to sample, whatever they are called."""
     found = []
     for name, values in channels.items():
-        unit = unit_of(named_unit(name)[1] or unit_said(values))
-        is_duration = unit is not None and unit.dimension == ROTARY.dimensions["time"]
+        is_duration = is_convertible(ROTARY, "time", named_unit(name)[1] or unit_said(values))
         if is_duration and values.ndim == 1 and values.size > 1 and increases(values):
             found.append(name)
     return found

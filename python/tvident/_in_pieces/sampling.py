@@ -12,7 +12,7 @@ from tvident import _arguments as arguments
 from tvident._files import FileWarning, check_no_counts, clock_among, full_name, listed, other_rate, said_otherwise
 from tvident._in_pieces.recorded import uniform
 from tvident._in_pieces.sources import Source
-from tvident._units import ROTARY, Channel, named_unit, times_in_seconds, unit_of
+from tvident._units import ROTARY, Channel, is_convertible, named_unit, times_in_seconds
 
 _TIMES = 4096
 """Samples whose times are held against the rate that is used."""
@@ -63,14 +63,11 @@ def _times(source: Source, samples: int) -> dict[str, npt.NDArray[Any]]:
     found = {}
     for name, (channel, count) in source.channels.items():
         bare, unit = named_unit(name)
-        if count == samples and (arguments.is_called_time(bare.rpartition(".")[2]) or _is_duration(unit)):
+        if count == samples and (
+            arguments.is_called_time(bare.rpartition(".")[2]) or is_convertible(ROTARY, "time", unit)
+        ):
             found[name] = channel.read(0, min(samples, _TIMES))
     return found
-
-
-def _is_duration(unit: str) -> bool:
-    known = unit_of(unit)
-    return known is not None and known.dimension == ROTARY.dimensions["time"]
 
 
 def _at_times(source: Source, name: str, samples: int) -> tuple[float, float]:

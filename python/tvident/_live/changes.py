@@ -119,23 +119,25 @@ class Stretches:
     """Of the samples before the latest stretches."""
     _latest: list[Point] = field(default_factory=list)
     _before: list[Point] = field(default_factory=list)
+    _rate_before: Rate = field(default_factory=Rate)
+    """Of the stretch before the latest."""
 
     def see(self, number: int, stamp: float) -> tuple[RateChange, Rate] | None:
         """Take a sample at its place, and return a change that shows now, with the rate since then."""
         self._latest.append((number, stamp))
         if stamp - self._latest[0][1] < _STRETCH or len(self._latest) < _FEW:
             return None
-        latest, before = (_line(points) for points in (self._latest, self._before))
+        latest, before = _line(self._latest), self._rate_before
         is_other = _differ(self.base, latest) and _differ(self.base, before) and not _differ(before, latest)
         if is_other:
             after = _line([*self._before, *self._latest])
             change = RateChange(self._before[0][1], self.base.period, after.period)
-            self.base, self._before, self._latest = after, [], []
+            self.base, self._before, self._rate_before, self._latest = after, [], Rate(), []
             # The base must not see what the clock's own rate will.
             return change, replace(after)
         for point in self._before:
             self.base.see(*point)
-        self._before, self._latest = self._latest, []
+        self._before, self._rate_before, self._latest = self._latest, latest, []
         return None
 
 
