@@ -46,11 +46,11 @@ _NOTABLE = 0.01
 """Of a rate: times have few digits, and recorders round what they state."""
 
 
-@arguments.called_as("FileRecording({'angle [deg]': angle, 'torque [N m]': torque})")
 class RatesDifferError(ValueError):
     """Single numbers of a file tell different sample rates."""
 
 
+@arguments.called_as("FileRecording({'angle [deg]': angle, 'torque [N m]': torque})")
 class FileRecording(Mapping[str, Channel]):
     """A recording from a file: a mapping of names to channels, each an array with its unit.
 
