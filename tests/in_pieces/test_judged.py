@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import pickle
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +15,7 @@ from scipy.signal import chirp, lsim
 
 import tvident
 from in_pieces.small_pieces import cut_small
+from tvident._in_pieces.told_by_weak_form import ToldByWeakForm
 
 Recording = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]
 SIGN = "is the torque's sign reversed, are the channels swapped?"
@@ -136,3 +139,30 @@ def test_a_doubtful_unit_is_shown_as_it_is_written(tmp_path: Path) -> None:
     path.write_text("angle_rev,torque\n1,2\n2,3\n3,5\n")
     with pytest.raises(ValueError, match="got 'rev': rev for revolutions"):
         tvident.identify_file(path, tmp_path / "out.csv", angle="angle", torque="torque", sample_rate=1000.0)
+
+
+def test_npy_waits_for_who_reads_the_verdict(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in memory; what is read then needs no file any more, goes through pickle, and is what other files hold at once."""
+    rig = tvident.simulate_torsional_rig(duration=60.0)
+    asked: list[int] = []
+    advice = ToldByWeakForm.advice
+
+    def counted(told: ToldByWeakForm, samples: int) -> list[str]:
+        asked.append(samples)
+        return advice(told, samples)
+
+    monkeypatch.setattr(ToldByWeakForm, "advice", counted)
+    parquet = pytest.importorskip("pyarrow.parquet")
+    np.save(tmp_path / "run.npy", np.stack([rig.angle, -rig.torque], axis=1))
+    call: dict[str, Any] = {"angle": "0", "torque": "1", "sample_rate": 1000.0, "method": "paper"}
+    found = [tvident.identify_file(tmp_path / "run.npy", tmp_path / "out.npy", **call) for _ in range(2)]
+    assert not asked
+    other = tvident.identify_file(tmp_path / "run.npy", tmp_path / "out.parquet", **call)
+    assert len(asked) == 1
+    told = json.loads(parquet.read_schema(tmp_path / "out.parquet").metadata[b"tvident"])
+    for one in tmp_path.iterdir():
+        one.unlink()
+    assert found[0].verdict == other.verdict == told["verdict"] == "do not trust: inertia is negative; see what to do"
+    assert [*found[0].advice] == [*other.advice] == told["advice"]
+    assert pickle.loads(pickle.dumps(found[1])).summary() == found[0].summary()  # noqa: S301 - its own
+    assert len(asked) == 3

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,8 @@ class FileIdentification:
     advice : tuple of str
         What is worth doing, of pieces and of the stretches that choices were made from.
     verdict : str
-        How well parameters are known, or why not to trust them, by rows that are spread over the file.
+        How well parameters are known, or why not to trust them, by rows that are spread over the file. Like the advice it is found when it
+        is first read, where the file has no place for it (.npy, .csv): it takes up to a second, and none of the files.
     assumed : dict of str to str
         Those of angle and torque of which neither the file nor the call said the unit, and what they were taken for.
 
@@ -65,9 +67,44 @@ class FileIdentification:
     flags: Mapping[str, int]
     settings: Mapping[str, Any]
     units: Mapping[str, str]
-    advice: tuple[str, ...] = ()
     assumed: Mapping[str, str] = field(default_factory=dict)
-    verdict: str = ""
+    _judge: Callable[[], tuple[str, tuple[str, ...]]] = field(default=lambda: ("", ()), repr=False, compare=False)
+
+    @property
+    def verdict(self) -> str:
+        """How well parameters are known, or why not to trust them, by rows that are spread over the file.
+
+        Returns
+        -------
+        str
+
+        See Also
+        --------
+        FileIdentification.summary : all in words.
+        """
+        return self._judged[0]
+
+    @property
+    def advice(self) -> tuple[str, ...]:
+        """What is worth doing, of pieces and of stretches.
+
+        Returns
+        -------
+        tuple of str
+
+        See Also
+        --------
+        FileIdentification.summary : all in words.
+        """
+        return self._judged[1]
+
+    @cached_property
+    def _judged(self) -> tuple[str, tuple[str, ...]]:
+        return self._judge()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: what was judged, without what it is judged from."""
+        return {**self.__dict__, "_judged": self._judged, "_judge": None}
 
     def __repr__(self) -> str:
         named = [

@@ -60,6 +60,11 @@ def holds_rows(path: Path) -> bool:
     return path.suffix.lower() == ".npy"
 
 
+def holds_facts(path: Path) -> bool:
+    """Return whether a file of this name holds settings and what was judged beside its columns."""
+    return path.suffix.lower() not in {".npy", ".csv"}
+
+
 def head_of_rows(row: np.dtype[Any], rows: int) -> bytes:
     """Return what a file of so many rows begins with."""
     head = io.BytesIO()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -12,18 +12,17 @@ from typing import Any
 import numpy as np
 
 from tvident import _core
-from tvident._advice import SWAPPED
 from tvident._equation import LINEAR_UNITS, UNITS
 from tvident._files import errors_name, put_in_place
 from tvident._identify import Long, Span, WeakForm, requested
 from tvident._in_pieces.choices import chosen, stretches
 from tvident._in_pieces.found import FileIdentification
-from tvident._in_pieces.judged import JudgedRows
+from tvident._in_pieces.judging import Judging, KeptStretches
 from tvident._in_pieces.kept import Kept
-from tvident._in_pieces.outputs import CHUNK, OutputTable, head_of_rows, holds_rows, writer
+from tvident._in_pieces.outputs import CHUNK, OutputTable, head_of_rows, holds_facts, holds_rows, writer
 from tvident._in_pieces.recorded import RecordingOfFile
 from tvident._in_pieces.rows import row_of
-from tvident._in_pieces.swapped import asked_if_swapped
+from tvident._in_pieces.swapped import asked_if_swapped, stretches_asked
 from tvident._in_pieces.told_by_weak_form import ToldByWeakForm, stretches_told
 from tvident._in_pieces.work import Alone, WindowsWork, Work
 from tvident._pieces import SHARED, Columns, Given, Mean, means_of, reach_of
@@ -200,16 +199,15 @@ class Run:
             settings = notes[0]["settings"]
             advice += notes[0]["advice"]
         constants = {name: (mean.value, mean.error) for name, mean in means.items()}
-        advice = [*self._told_by_weak_form(work, means), *advice]
-        verdict = "no verdict: there are no rows"
-        if self._kept.count:
-            judged = JudgedRows(self._some_rows(work, means), status, advice, settings, self._asked.units)
-            is_asked = judged.is_doubted and not any(SWAPPED in line for line in advice)
-            judged = judged.with_cure(self._asked_if_swapped() if is_asked else ())
-            verdict, advice = judged.verdict(), list(judged.advice)
-        told = {"settings": settings, "constants": constants, "record_status": int(status), "advice": advice}
-        told["verdict"] = verdict
-        self._put_in_place(work, means, told)
+        judging = self._judging(work, means, status, advice, settings)
+        if holds_facts(self._output):
+            verdict, said = judging.judged()
+            judge: Any = partial(tuple, (verdict, said))
+            told = {"settings": settings, "constants": constants, "record_status": int(status), "advice": list(said)}
+            self._put_in_place(work, means, {**told, "verdict": verdict})
+        else:
+            judge = judging.judged
+            self._put_in_place(work, means, {})
         flags, rows = self._kept.flags, self._kept.count
         self._kept.remove()
         return FileIdentification(
@@ -221,30 +219,33 @@ class Run:
             flags,
             settings,
             self._asked.units,
-            tuple(advice),
             self._asked.recording.assumed,
-            verdict,
+            judge,
         )
 
-    def _told_by_weak_form(self, work: Work, means: Mapping[str, Mean]) -> list[str]:
-        """Return what the weak form says of stretches of a record in strong form."""
-        asked, long = self._asked, self._asked.long
-        if long is None or asked.given.weighted:
-            return []
-        step = asked.step
-
-        def rows(span: Span) -> Columns:
-            return self._rows(work, means, (-(-span[0] // step), -(-span[1] // step)))
-
-        told = ToldByWeakForm(long, asked.given, asked.recording.held, rows, asked.recording.begin, asked.units)
-        return told.advice(self._samples)
+    def _judging(
+        self, work: Work, means: Mapping[str, Mean], status: Status, advice: Sequence[str], settings: Mapping[str, Any]
+    ) -> Judging:
+        """Return what a verdict is made from, with all that is needed of the files."""
+        asked, long, step = self._asked, self._asked.long, self._asked.step
+        is_told = long is not None and not asked.given.weighted
+        spans = stretches_told(self._samples)
+        spans = [] if asked.given.weighted else spans if is_told else list(stretches_asked(spans))
+        held = {span: asked.recording.held([span]) for span in spans}
+        found = {span: self._rows(work, means, (-(-span[0] // step), -(-span[1] // step))) for span in spans if is_told}
+        kept = KeptStretches(held, found)
+        equation = asked.given.equation if long is None else long.in_weak_form
+        weak = None
+        if long is not None and is_told:
+            weak = ToldByWeakForm(long, asked.given, kept.read, kept.found, asked.recording.begin, asked.units)
+        rows = self._some_rows(work, means) if self._kept.count else {}
+        return Judging(asked.given, equation, kept, weak, rows, self._samples, status, advice, settings, asked.units)
 
     def _asked_if_swapped(self) -> list[str]:
-        asked, long = self._asked, self._asked.long
+        asked = self._asked
         if asked.given.weighted:
             return []
-        equation = asked.given.equation if long is None else long.in_weak_form
-        return asked_if_swapped(asked.given, equation, asked.recording.held, stretches_told(self._samples))
+        return asked_if_swapped(asked.given, asked.given.equation, asked.recording.held, stretches_told(self._samples))
 
     def _some_rows(self, work: Work, means: Mapping[str, Mean]) -> Columns:
         """Return rows that are spread over the result."""

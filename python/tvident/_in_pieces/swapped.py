@@ -15,6 +15,11 @@ _MOST = 2
 """Stretches that are asked."""
 
 
+def stretches_asked(spans: Sequence[Span]) -> Sequence[Span]:
+    """Return which of some stretches are asked."""
+    return spans[:: max(1, len(spans) // _MOST)][:_MOST]
+
+
 def asked_if_swapped(
     given: Given, equation: Mapping[str, Any], read: Callable[[Sequence[Span]], Held], spans: Sequence[Span]
 ) -> list[str]:
@@ -22,7 +27,7 @@ def asked_if_swapped(
     if any(isinstance(equation.get(name), int | float) for name in COEFFICIENTS):
         return []
     weak = replace(given, method=WeakForm(), equation=equation, settings=None)
-    for first, end in spans[:: max(1, len(spans) // _MOST)][:_MOST]:
+    for first, end in stretches_asked(spans):
         held = read([(first, end)])
         if takes_work(held.angle, held.torque):
             continue
