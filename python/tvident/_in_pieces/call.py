@@ -126,7 +126,8 @@ def identify_file(
     constants stay those of the pieces, and the record has the flag KIND_CONTRADICTED.
 
     Equations (2) to (4), (8) and (9) of the paper. The cost is that of :func:`identify`, in strong form about 60 ns a sample and thread,
-    and that of writing and reading the results once more.
+    and that of writing and reading the results once more; what windows give is written while the next piece is computed,
+    by a thread of its own beside the workers.
 
     See Also
     --------

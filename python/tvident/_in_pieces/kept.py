@@ -80,17 +80,20 @@ class Kept:
         self._found["facts"][name] = value
         self._write()
 
-    def add(self, columns: Columns, note: Any, of: int, head: bytes | None = None) -> None:
-        """Keep the rows of one more piece, of so many rows in all, and a note of it.
+    def begin(self, columns: Columns, of: int, head: bytes | None = None) -> None:
+        """Make the file of so many rows in all, before the first are kept, with room for them.
 
         With a `head` the file of all rows begins with it and is what a result may be; without one the columns of every piece lie one after
         the other, which costs half as much to write and a fifth to read.
         """
-        row, begin, done = row_of(columns), len(head or b""), self._found["rows"]
-        with self.place.open("r+b" if done else "w+b") as file:
-            if not done:
-                make_room(file, begin + of * row.itemsize)
+        with self.place.open("wb") as file:
+            make_room(file, len(head or b"") + of * row_of(columns).itemsize)
             file.write(head or b"")
+
+    def add(self, columns: Columns, note: Any, head: bytes | None = None) -> None:
+        """Keep the rows of one more piece, and a note of it; the head is that which the file began with."""
+        row, begin, done = row_of(columns), len(head or b""), self._found["rows"]
+        with self.place.open("r+b") as file:
             # What an interrupted call wrote beyond the rows that it noted is written again.
             file.seek(begin + done * row.itemsize)
             count = write_columns(file, columns) if head is None else write_rows(file, row, columns)

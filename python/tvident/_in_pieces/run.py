@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -15,6 +15,7 @@ from tvident import _core
 from tvident._equation import LINEAR_UNITS, UNITS
 from tvident._files import errors_name, put_in_place
 from tvident._identify import Long, Span, WeakForm, requested
+from tvident._in_pieces.behind import Behind
 from tvident._in_pieces.choices import chosen, stretches
 from tvident._in_pieces.found import FileIdentification
 from tvident._in_pieces.judging import Judging, KeptStretches
@@ -121,24 +122,33 @@ class Run:
     def all(self) -> FileIdentification:
         """Do all that is not done yet."""
         settings, work = self._prepared()
-        for piece in self._pieces[len(self._kept.notes) :]:
-            # Nothing of a piece stays while the next one is worked on.
-            self._keep(work, *work.piece(piece, self._progress(piece)))
-            if self._report is not None:
-                self._report(piece[1], self._samples)
+        # Of other work nothing stays while the next piece is worked on, which takes several times the memory.
+        with Behind(is_apart=work.is_final) as behind:
+            for piece in self._pieces[len(self._kept.notes) :]:
+                behind.do(self._keeping(work, piece))
+                if self._report is not None:
+                    self._report(piece[1], self._samples)
         self._asked.recording.check_unchanged()
         if self._report is not None:
             # While no other call may write: what is told may ask for one.
             self._report.finish()
         return self._written(settings, work)
 
-    def _keep(self, work: Work, columns: Columns, note: Any) -> None:
-        """Keep what was found of a piece, in a file that only needs its name where nothing changes any more."""
+    def _keeping(self, work: Work, piece: Span) -> Callable[[], None]:
+        """Return what keeps what is found of a piece, in a file that only needs its name where nothing changes any more."""
+        columns, note = work.piece(piece, self._progress(piece))
         rows = -(-self._samples // self._asked.step)
         is_result = work.is_final and holds_rows(self._output)
         head = head_of_rows(row_of(columns), rows) if is_result else None
-        with errors_name(self._output):
-            self._kept.add(columns, note, rows, head)
+        if piece == self._pieces[0]:
+            with errors_name(self._output):
+                self._kept.begin(columns, rows, head)
+
+        def keep() -> None:
+            with errors_name(self._output):
+                self._kept.add(columns, note, head)
+
+        return keep
 
     def _progress(self, piece: Span) -> Any:
         """Return what is told of the work within a piece."""
