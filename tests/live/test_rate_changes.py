@@ -8,6 +8,7 @@ import pytest
 from live.test_losses import COUNT, Numbers, Stamps, clocked, sent, without
 from tvident._live import LiveClock
 from tvident._live.changes import Stretches
+from tvident._live.rate import Rate
 
 CHANGES = 6000
 """The sample at which the rate changes."""
@@ -138,3 +139,37 @@ def test_what_was_not_counted_is_not_taken_back() -> None:
         clock.rows((stamp, float(place), 0.0))
     assert (clock.lost, clock.repeated) == (0, 0)
     assert kept_of(clock)[1] == 0
+
+
+@pytest.mark.parametrize("counts", [(0, 5), (5, 0), (1, 1), (3, 40), (700, 2)])
+def test_rates_put_together_are_those_of_all_samples(counts: tuple[int, int]) -> None:
+    generator = np.random.default_rng(sum(counts))
+    stamps = 1e6 + 1e-3 * np.arange(sum(counts)) + generator.normal(0, 1e-4, sum(counts))
+    rates = [Rate() for _ in range(3)]
+    for number, stamp in enumerate(stamps.tolist()):
+        for rate in (rates[0], rates[1 if number < counts[0] else 2]):
+            rate.see(number, stamp)
+    whole, joined = rates[0], rates[1].joined(rates[2])
+    assert (joined.count, joined.first, joined.last) == (whole.count, whole.first, whole.last)
+    # Stamps are rounded to 1e-10 s.
+    assert joined.period == pytest.approx(whole.period, rel=1e-6, nan_ok=True)
+    if joined.count > 2:
+        assert joined.scatter == pytest.approx(whole.scatter, rel=1e-5, abs=1e-9)
+
+
+def test_no_sample_takes_longer_than_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At 10 kHz samples of two seconds were summed twice with the last of them: 26 ms."""
+    seen: list[int] = []
+    see = Rate.see
+
+    def counted(rate: Rate, number: float, time: float) -> None:
+        seen[-1] += 1
+        see(rate, number, time)
+
+    monkeypatch.setattr(Rate, "see", counted)
+    stretches = Stretches()
+    for number in range(70_000):
+        seen.append(0)
+        stretches.see(number, number * 1e-4)
+    assert max(seen) == 1
+    assert stretches.base.count > 0

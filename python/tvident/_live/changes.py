@@ -112,41 +112,42 @@ class Looks:
 
 
 @dataclass
+class _Stretch:
+    """The rate of some samples, and the stamp of the first."""
+
+    begin: float = math.nan
+    rate: Rate = field(default_factory=Rate)
+
+
+@dataclass
 class Stretches:
-    """Compares the rate of two stretches with that of all samples before: a change that the clock follows shows nowhere else."""
+    """Compares the rate of two stretches with that of all samples before: a change that the clock follows shows nowhere else.
+
+    Sums of a stretch grow with each sample, and are put together: no sample takes longer than another.
+    """
 
     base: Rate = field(default_factory=Rate)
     """Of the samples before the latest stretches."""
-    _latest: list[Point] = field(default_factory=list)
-    _before: list[Point] = field(default_factory=list)
-    _rate_before: Rate = field(default_factory=Rate)
-    """Of the stretch before the latest."""
+    _latest: _Stretch = field(default_factory=_Stretch)
+    _before: _Stretch = field(default_factory=_Stretch)
 
     def see(self, number: int, stamp: float) -> tuple[RateChange, Rate] | None:
         """Take a sample at its place, and return a change that shows now, with the rate since then."""
-        self._latest.append((number, stamp))
-        if stamp - self._latest[0][1] < _STRETCH or len(self._latest) < _FEW:
+        if not self._latest.rate.count:
+            self._latest.begin = stamp
+        self._latest.rate.see(number, stamp)
+        if stamp - self._latest.begin < _STRETCH or self._latest.rate.count < _FEW:
             return None
-        latest, before = _line(self._latest), self._rate_before
-        is_other = _differ(self.base, latest) and _differ(self.base, before) and not _differ(before, latest)
-        if is_other:
-            after = _line([*self._before, *self._latest])
-            change = RateChange(self._before[0][1], self.base.period, after.period)
-            self.base, self._before, self._rate_before, self._latest = after, [], Rate(), []
+        latest, before = self._latest.rate, self._before.rate
+        if _differ(self.base, latest) and _differ(self.base, before) and not _differ(before, latest):
+            after = before.joined(latest)
+            change = RateChange(self._before.begin, self.base.period, after.period)
+            self.base, self._before, self._latest = after, _Stretch(), _Stretch()
             # The base must not see what the clock's own rate will.
             return change, replace(after)
-        for point in self._before:
-            self.base.see(*point)
-        self._before, self._rate_before, self._latest = self._latest, latest, []
+        self.base = self.base.joined(before)
+        self._before, self._latest = self._latest, _Stretch()
         return None
-
-
-def _line(points: list[Point]) -> Rate:
-    """Return the rate of some samples."""
-    rate = Rate()
-    for point in points:
-        rate.see(*point)
-    return rate
 
 
 def _differ(one: Rate, other: Rate) -> bool:

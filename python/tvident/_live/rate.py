@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -79,6 +79,25 @@ class Rate:
         self.squares += by * (number - self.number)
         self.products += by * (time - self.time)
         self.times += late * (time - self.time)
+
+    def joined(self, other: Rate) -> Rate:
+        """Return the line through the samples of both, of which the other's came later."""
+        if not self.count or not other.count:
+            return replace(self if self.count else other)
+        count = self.count + other.count
+        by, late = other.number - self.number, other.time - self.time
+        share = other.count / count
+        weight = self.count * share
+        return Rate(
+            count,
+            self.number + share * by,
+            self.time + share * late,
+            self.squares + other.squares + weight * by * by,
+            self.products + other.products + weight * by * late,
+            self.times + other.times + weight * late * late,
+            self.first,
+            other.last,
+        )
 
     @property
     def period(self) -> float:
