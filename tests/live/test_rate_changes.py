@@ -173,3 +173,52 @@ def test_no_sample_takes_longer_than_another(monkeypatch: pytest.MonkeyPatch) ->
         stretches.see(number, number * 1e-4)
     assert max(seen) == 1
     assert stretches.base.count > 0
+
+
+def thin(kept: Numbers, rate: float = 1000.0, block: int = 1) -> list[str]:
+    """Return what is said of samples of a rate that have these numbers, at 1 kHz nominal: after each, and at the end."""
+    generator = np.random.default_rng(8)
+    last: Numbers = np.minimum((np.arange(kept.size) // block + 1) * block, kept.size) - 1
+    late = generator.exponential(2e-5 * block, kept.size)[last]
+    taken: Stamps = kept[last] / rate + late - (last - np.arange(kept.size)) * 1e-3
+    clock, said = LiveClock(1e-3), list[str]()
+    for stamp in taken.tolist():
+        clock.rows((stamp, generator.normal(), 1.0))
+        said.append(clock.thinned)
+    clock.rest()
+    return [*said, clock.thinned]
+
+
+@pytest.mark.parametrize("turns", [2, 3, 4])
+@pytest.mark.parametrize("block", [1, 20])
+def test_a_part_of_the_rate_from_the_first_sample_on_is_said(turns: int, block: int) -> None:
+    """It was so many lost samples, and the nominal rate to a millionth."""
+    said = thin(np.arange(4000), 1000 / turns, block)
+    words = f"{turns - 1} of {turns} samples are lost, from the first on, or the rate is "
+    assert said[-1].startswith(words)
+    # Four standard errors of a line through 64 samples, or 16 buffers, that are 2 % of a period late, or 2 % of a buffer; four digits.
+    assert float(said[-1].split("--sample-rate ")[1]) == pytest.approx(1000 / turns, rel=2.2e-3 if block > 1 else 5e-4)
+    assert any(said[:1500])
+    assert thin(np.arange(0, 4000 * turns, turns))[-1].startswith(words)
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [
+        np.flatnonzero(np.random.default_rng(2).random(12_000) < 0.5),
+        np.flatnonzero(np.arange(12_000) % 3),
+        np.concatenate([np.arange(0, 200, 2), np.arange(200, 8000)]),
+        np.arange(8000),
+    ],
+    ids=["half by chance", "two of three", "few by turns", "all"],
+)
+def test_other_losses_are_not_said_to_be_by_turns(kept: Numbers) -> None:
+    assert not any(thin(kept))
+
+
+@pytest.mark.parametrize("after", [1, 3])
+def test_what_is_said_of_the_first_samples_is_not_said_of_all(after: int) -> None:
+    """A session may begin with every second sample, and go on with all, or with every third."""
+    said = thin(np.concatenate([np.arange(0, 4000, 2), np.arange(4000, 16_000, after)]))
+    assert any(said[:2000])
+    assert "1 of 2" not in said[-1]

@@ -92,6 +92,7 @@ class LiveClock(ClockCounts):
             self._looked = look.period
         else:
             self._other = look.period
+            self._is_thin = look.period > (1 + HALF) * self._period
         return [one for row in look.rows for one in self._row(row)]
 
     def _row(self, row: Row) -> list[Row]:

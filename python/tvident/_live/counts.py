@@ -16,6 +16,9 @@ _ENOUGH, _MOST_REPEATED, _FASTER = 200, 0.1, 1.1
 WHOLE = 0.05
 """Periods by which a longer period is no whole number of them, at least, where no other samples can be missing."""
 
+_TURNS = 0.05
+"""Of the samples that are lost by turns, how many more or fewer are lost, at most, where it is still said."""
+
 _FEW = 32
 """Buffers, or samples, that say how far a rate is off, at least."""
 
@@ -59,6 +62,8 @@ class ClockCounts:
         self.changes: list[RateChange] = []
         self._thinned: RateChange | None = None
         """To a whole number of nominal periods, which lost samples explain as well."""
+        self._is_thin = False
+        """Whether the first samples came at another rate than the nominal one that is two thirds of it or less."""
         self.mistaken = 0
         self.lost = self.repeated = self.jumps = self.back = self.twice = self.empty = self.unsure = 0
 
@@ -124,12 +129,27 @@ class ClockCounts:
         """What to say where the rate became a half, a third, ... of the nominal one, or samples are lost by turns; nothing elsewhere."""
         change = self._thinned
         if change is None:
-            return ""
+            return self._thin_from_the_first
         turns = round(change.after / self._period)
         which = "every second sample is" if turns == 2 else f"{turns - 1} of {turns} samples are"  # noqa: PLR2004 - a half
         return (
             f"from {change.stamp:.1f} s on the rate seems to be {1 / change.after:.4g} Hz, or {which} lost: "
             f"counted as lost; if it is the rate, give --sample-rate {1 / change.after:.4g} from there on"
+        )
+
+    @property
+    def _thin_from_the_first(self) -> str:
+        """The same of a session that began so: said while as many of all its samples are lost as that rate leaves out."""
+        periods = self._other / self._period
+        turns = round(periods)
+        by_turns = (turns - 1) * self._came
+        is_whole = abs(periods - turns) < WHOLE and self._came >= _ENOUGH
+        if not (self._is_thin and is_whole and abs(self.lost - by_turns) <= _TURNS * by_turns):
+            return ""
+        rate = f"{1 / self._other:.4g}"
+        return (
+            f"{turns - 1} of {turns} samples are lost, from the first on, or the rate is {rate} Hz: "
+            f"counted as lost; if it is the rate, give --sample-rate {rate}"
         )
 
     @property
