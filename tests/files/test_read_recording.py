@@ -339,3 +339,33 @@ def test_a_single_number_that_contradicts_the_times_is_said(tmp_path: Path, name
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert tvident.read_recording(path).sample_rate == 500
+
+
+@pytest.mark.parametrize("number", [-1.0, 0.0, np.nan])
+def test_a_number_that_is_no_sample_rate_is_named(tmp_path: Path, number: float) -> None:
+    """The rate was asked for as if the file said nothing of it."""
+    call = ["--angle", "angle", "--torque", "torque"]
+    channels: dict[str, Any] = {"angle": np.sin(T), "torque": np.cos(T)}
+    for name in ("fs", "Sampling Frequency [kHz]", "dt"):
+        path = tmp_path / "x.npz"
+        np.savez(path, **channels | {name: number})
+        bare = name.split(" [", maxsplit=1)[0]
+        with pytest.raises(
+            ValueError, match=f"; {bare} says {number:g}, which is no sample rate or period; give sample_rate="
+        ):
+            assert tvident.read_recording(path).sample_rate
+        asked = CliRunner().invoke(main, ["identify", str(path), *call])
+        assert f"says {number:g}, which is no sample rate or period" in asked.stderr
+    text = tmp_path / "x.csv"
+    text.write_text(f"Sample rate: {number:g} Hz\nangle,torque\n1,2\n2,0\n1,1\n")
+    said = f"'Sample rate: {number:g} Hz' is no sample rate or period"
+    with pytest.raises(ValueError, match=said):
+        assert tvident.read_recording(text).sample_rate
+    for asked in (
+        CliRunner().invoke(main, ["identify", str(text), *call]),
+        CliRunner().invoke(main, ["identify", "-", *call], text.read_bytes()),
+    ):
+        assert f"give --sample-rate, --delta or --time; {said}" in asked.stderr
+    # Another line, or times, tell it.
+    text.write_text(f"Sample rate: {number:g} Hz\nSample rate: 500 Hz\nangle,torque\n1,2\n2,0\n1,1\n")
+    assert tvident.read_recording(text).sample_rate == 500

@@ -223,3 +223,16 @@ def test_single_numbers_that_differ_are_named(tmp_path: Path, rig: Any) -> None:
         pytest.raises(TypeError, match="needs the sample period"),
     ):
         tvident.identify_file(path, tmp_path / "out.npy", angle="angle", torque="torque")
+
+
+@pytest.mark.parametrize("ending", ["h5", "csv"])
+def test_a_number_that_is_no_sample_rate_is_named(tmp_path: Path, rig: Any, ending: str) -> None:
+    path = tmp_path / f"run.{ending}"
+    if ending == "h5":
+        with h5py.File(path, "w") as file:
+            file["angle"], file["torque"] = rig.angle, rig.torque
+            file.attrs["fs"] = -1.0
+    else:
+        path.write_text("fs: -1 Hz\nangle,torque\n" + "1,2\n2,1\n" * 50)
+    with pytest.raises(TypeError, match=r"no channel of times; .*-1.* no sample rate or period; give sample_rate="):
+        tvident.identify_file(path, tmp_path / "out.npy", angle="angle", torque="torque")

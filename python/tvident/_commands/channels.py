@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 import shutil
 import sys
@@ -17,20 +16,22 @@ import numpy.typing as npt
 
 from tvident import recordings
 from tvident._files import (
-    FileRecording,
     RatesDifferError,
-    StatedRate,
+    check_alike,
     counters,
     ending_by,
     full_name,
     increasing_times,
     listed,
+    no_rate_stated,
+    no_rate_told,
     printable,
     said_otherwise,
     stated_rate,
     time_channels,
+    told_rates,
 )
-from tvident._units import Channel, UnitError, factor_between, named_unit
+from tvident._units import Channel, named_unit
 
 _FEW = 64
 """Numbers of trials that may all say one thing."""
@@ -38,13 +39,10 @@ _FEW = 64
 _FEW_CLOCKS = 3
 """Channels of times that are named at most."""
 
-_RATES = {"fs", "fsamp", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency"}
-"""What a sample rate is called beside channels, without blanks and lines."""
-
 _MOST_START = 4096
 
 _STATED = "tvident.stated"
-"""Where a command keeps the sample rate that lines of standard input state, which is read once."""
+"""Where a command keeps what to type as lines of standard input state the sample rate, which are read once."""
 
 
 def channel_of(channels: recordings.Channels, name: str, file: str | None) -> npt.NDArray[Any]:
@@ -103,46 +101,30 @@ def _counted_in(channels: recordings.Channels) -> str:
 
 
 def _rate_in(channels: recordings.Channels) -> str:
-    """Return what to type where a single number of a file is called as a sample rate is; nothing elsewhere."""
-    single = {name: value for name, value in channels.items() if value.size == 1}
+    """Return what to type where numbers of a file tell a sample rate, also those of trials that all say the same; nothing elsewhere."""
     try:
-        FileRecording(single, source="the file").sample_rate  # noqa: B018 - whether numbers differ
+        check_alike(told_rates(channels), "the file")
     except RatesDifferError as error:
         return f"; {str(error).replace('sample_rate=', '--sample-rate')}"
-    except ValueError:
-        pass  # none tells it
-    for name, value in channels.items():
-        plain, unit = named_unit(name)
-        bare = re.sub(r"[\s_.-]", "", plain.rpartition(".")[2]).casefold()
-        if bare not in _RATES or value.size != 1:
-            continue
-        try:
-            rate = float(value.item()) * (factor_between(unit, "Hz", name=name) if unit else 1.0)
-        except UnitError:  # such as degrees: no sample rate
-            continue
-        if 0 < rate < np.inf:
-            return f"; it may be --sample-rate {rate:.10g}, as {printable(name)} says"
-    for name, value in channels.items():
-        # A period; of trials each may say the same.
-        if value.size > _FEW or np.unique(value).size != 1:
-            continue
-        try:
-            rate = FileRecording({name: value.reshape(-1)[:1]}).sample_rate
-        except ValueError:
-            continue
+    for name, rate in told_rates(channels, most=_FEW).items():
         return f"; it may be --sample-rate {rate:.10g}, as {printable(name)} says"
-    return ""
+    wrong = no_rate_told(channels)
+    return f"; {wrong}" if wrong else ""
 
 
 def stated_in(file: str | None) -> str:
     """Return what to type where a line above the numbers of a text states the sample rate; nothing elsewhere."""
-    stated = None if file is None else _stated_of_input() if file == "-" else stated_rate(Path(file))
-    return "" if stated is None else f"; it may be --sample-rate {stated.rate:.10g}, as the file says: '{stated.words}'"
+    if file == "-":
+        context = click.get_current_context(silent=True)
+        return "" if context is None else str(context.meta.get(_STATED, ""))
+    return "" if file is None else _stated(Path(file))
 
 
-def _stated_of_input() -> StatedRate | None:
-    context = click.get_current_context(silent=True)
-    return None if context is None else context.meta.get(_STATED)
+def _stated(path: Path) -> str:
+    stated, wrong = stated_rate(path), no_rate_stated(path)
+    if stated is not None:
+        return f"; it may be --sample-rate {stated.rate:.10g}, as the file says: '{stated.words}'"
+    return f"; {wrong}" if wrong else ""
 
 
 def channels_in(file: str | None) -> recordings.Channels:
@@ -186,7 +168,7 @@ def _standard_input() -> recordings.Channels:
             raise recordings.FileError(str(error).replace(str(named), "standard input")) from None
         otherwise, context = said_otherwise(named, found), click.get_current_context(silent=True)
         if context is not None:
-            context.meta[_STATED] = stated_rate(named)
+            context.meta[_STATED] = _stated(named)
     if otherwise:
         click.echo(f"Warning: standard input: {otherwise}", err=True)
     for one in said:

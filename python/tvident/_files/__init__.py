@@ -20,9 +20,10 @@ if TYPE_CHECKING:
     from tvident._files.joints import joint_of
     from tvident._files.no_values import marks_given, without_marks
     from tvident._files.rates import other_rate
-    from tvident._files.recorded import FileRecording, RatesDifferError, read_recording, said_otherwise
+    from tvident._files.recorded import FileRecording, read_recording, said_otherwise
     from tvident._files.recordings import TEXT_ENDINGS, read
-    from tvident._files.stated import StatedRate, stated_rate
+    from tvident._files.single_rates import RatesDifferError, check_alike, no_rate_told, told_rates
+    from tvident._files.stated import no_rate_stated, stated_rate
     from tvident._files.text import copy_text, names_of_text
     from tvident._files.which_clock import check_no_counts, clock_among, increasing_times, time_channels
 
@@ -34,9 +35,9 @@ __all__ = [
     "FileRecording",
     "FileWarning",
     "RatesDifferError",
-    "StatedRate",
     "aligned",
     "channel",
+    "check_alike",
     "check_apart",
     "check_beside",
     "check_folder",
@@ -56,6 +57,8 @@ __all__ = [
     "marks_given",
     "named_field",
     "names_of_text",
+    "no_rate_stated",
+    "no_rate_told",
     "other_rate",
     "place_beside",
     "printable",
@@ -68,6 +71,7 @@ __all__ = [
     "settings_beside",
     "stated_rate",
     "time_channels",
+    "told_rates",
     "units_of_table",
     "without_marks",
     "write_csv",
@@ -84,15 +88,18 @@ _READERS = {
     "other_rate": "rates",
     "without_marks": "no_values",
     "FileRecording": "recorded",
-    "RatesDifferError": "recorded",
     "read_recording": "recorded",
     "said_otherwise": "recorded",
     "read": "recordings",
     "TEXT_ENDINGS": "recordings",
-    "StatedRate": "stated",
+    "no_rate_stated": "stated",
     "stated_rate": "stated",
     "copy_text": "text",
     "names_of_text": "text",
+    "RatesDifferError": "single_rates",
+    "check_alike": "single_rates",
+    "no_rate_told": "single_rates",
+    "told_rates": "single_rates",
     "check_no_counts": "which_clock",
     "clock_among": "which_clock",
     "increasing_times": "which_clock",

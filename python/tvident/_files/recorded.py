@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -17,7 +15,8 @@ from tvident._files.channels import Channels, FileWarning, full_name
 from tvident._files.counts import counters
 from tvident._files.names import listed, printable
 from tvident._files.recordings import read
-from tvident._files.stated import stated_rate
+from tvident._files.single_rates import check_alike, differ, no_rate_told, told_rates
+from tvident._files.stated import no_rate_stated, stated_rate
 from tvident._files.table import write_table
 from tvident._files.which_clock import (
     check_no_counts,
@@ -29,25 +28,13 @@ from tvident._files.which_clock import (
 )
 from tvident._units import (
     Channel,
-    UnitError,
-    factor_between,
     named_unit,
     times_in_seconds,
     with_unit,
 )
 
-_RATE = re.compile(r"(fs|f_s|fsamp|sample_?rate|sampling_?(rate|frequency)|samplerate|fsample|rate)", re.IGNORECASE)
-
-_PERIOD = re.compile(r"(ts|dt|delta_?t|t_?sample|t_?samp|sampl(e|ing)_?(time|period|interval))", re.IGNORECASE)
-"""What single numbers are called that are samples per second, and seconds per sample."""
-
-
 _NOTABLE = 0.01
 """Of a rate: times have few digits, and recorders round what they state."""
-
-
-class RatesDifferError(ValueError):
-    """Single numbers of a file tell different sample rates."""
 
 
 @arguments.called_as("FileRecording({'angle [deg]': angle, 'torque [N m]': torque})")
@@ -116,6 +103,8 @@ class FileRecording(Mapping[str, Channel]):
         self._names = dict(zip(full, self._channels, strict=True))
         self._rate = None if sample_rate is None else arguments.positive_number("sample_rate", sample_rate)
         self._source = source
+        self._no_rate = ""
+        """What the file states as a sample rate that is none."""
 
     def __getitem__(self, name: str) -> Channel:
         if name in self._channels:
@@ -153,12 +142,8 @@ class FileRecording(Mapping[str, Channel]):
         """
         if self._rate is not None:
             return float(self._rate)
-        told = _told_rates(self._channels)
-        if _differ(told):
-            rates = " and ".join(f"{name} says {rate:.7g} Hz" for name, rate in told.items())
-            raise RatesDifferError(
-                f"single numbers must tell one sample rate; of {self._source} {rates}: give sample_rate= with the right one"
-            )
+        told = told_rates(self._channels)
+        check_alike(told, self._source)
         if told:
             return next(iter(told.values()))
         time = self.time
@@ -168,8 +153,10 @@ class FileRecording(Mapping[str, Channel]):
             if len(several) > 1:
                 had = f"several: {listed(several)}"
                 cure = f"give the clocks of angle and torque, such as t=(recording[{several[0]!r}], recording[{several[1]!r}]), or "
+            wrong = no_rate_told(self._channels) or self._no_rate
             raise ValueError(
-                f"a sample rate needs a channel of times; {self._source} has {had}; {cure}give sample_rate= where it is needed"
+                f"a sample rate needs a channel of times; {self._source} has {had}; {wrong and wrong + '; '}{cure}give sample_rate= "
+                "where it is needed"
             )
         try:
             step = float(time[-1] - time[0]) / (time.size - 1)
@@ -294,29 +281,6 @@ class FileRecording(Mapping[str, Channel]):
         }
 
 
-def _told_rates(channels: Mapping[str, Channel]) -> dict[str, float]:
-    """Return the samples per second that single numbers say, by their names."""
-    told = {name: _rate_of(name, values) for name, values in channels.items() if values.size == 1}
-    return {name: rate for name, rate in told.items() if rate is not None}
-
-
-def _differ(told: Mapping[str, float]) -> bool:
-    return bool(told) and max(told.values()) > (1 + _NOTABLE) * min(told.values())
-
-
-def _rate_of(name: str, value: Channel) -> float | None:
-    """Return the samples per second that a single number says, None where it is called otherwise or cannot be one."""
-    bare, number = name.rpartition(".")[2], float(value.reshape(-1)[0])
-    for pattern, unit, is_rate in ((_RATE, "Hz", True), (_PERIOD, "s", False)):
-        if pattern.fullmatch(bare) and math.isfinite(number) and number > 0:
-            try:
-                scaled = number * (factor_between(value.unit, unit, name=name) if value.unit else 1.0)
-            except UnitError:
-                continue
-            return scaled if is_rate else 1 / scaled
-    return None
-
-
 @arguments.called_as("read_recording('run.csv')")
 def read_recording(path: str | Path, *, missing: float | Sequence[float] = ()) -> FileRecording:
     """Read a recording from a file: its channels by name, with their units and the sample rate.
@@ -374,7 +338,9 @@ def read_recording(path: str | Path, *, missing: float | Sequence[float] = ()) -
     said = said_otherwise(path, channels)
     if said:
         warnings.warn(f"{printable(path)}: {said}", FileWarning, stacklevel=2)
-    return FileRecording(channels, sample_rate=rate, source=printable(path.name))
+    recording = FileRecording(channels, sample_rate=rate, source=printable(path.name))
+    recording._no_rate = no_rate_stated(path)  # noqa: SLF001 - of this file
+    return recording
 
 
 def said_otherwise(path: Path, channels: Mapping[str, npt.NDArray[Any]]) -> str:
@@ -386,9 +352,9 @@ def said_otherwise(path: Path, channels: Mapping[str, npt.NDArray[Any]]) -> str:
         shown = recording.sample_rate
     except ValueError:
         return ""
-    told = _told_rates(FileRecording(channels))
+    told = told_rates(FileRecording(channels))
     # Where they differ the sample rate says so.
-    for name, rate in told.items() if not _differ(told) else ():
+    for name, rate in told.items() if not differ(told) else ():
         clock = recording._clock()  # noqa: SLF001 - of this class
         if not (clock is not None and clock.unit) and may_be_of_other_unit(shown / rate, _NOTABLE):
             return ""

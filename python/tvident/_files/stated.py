@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -35,6 +36,8 @@ _PERIOD = re.compile(
 _BEFORE_UNIT = r"(?<=\d)(?!e[+-]?\d)(?=[^\W\d_])"
 """Where a unit follows its number without a blank, as in 500Hz."""
 
+_NUMBER = re.compile(r"-?\d|nan$|inf$", re.IGNORECASE)
+
 _BEHIND_NAME = re.compile(r'(?:[\[(][^\])]*[\])])?"?\s*,')
 
 
@@ -48,17 +51,24 @@ class StatedRate:
 
 def stated_rate(path: Path) -> StatedRate | None:
     """Return the sample rate that lines above the numbers of a text state; None where none does, or several differ."""
+    stated = _stated_in(_above_numbers(path))
+    return None if stated is None or math.isnan(stated.rate) else stated
+
+
+def no_rate_stated(path: Path) -> str:
+    """Return that a line above the numbers of a text states a sample rate or period which is none; nothing where none does."""
+    stated = _stated_in(_above_numbers(path))
+    return "" if stated is None or stated.rate > 0 else f"'{stated.words}' is no sample rate or period"
+
+
+def _above_numbers(path: Path) -> list[str]:
+    """Return the lines of a text above the first one of numbers; all of the first ones where none is, none where it is no text."""
     if ending_of(path).lower() not in TEXT_ENDINGS:
-        return None
+        return []
     try:
         lines = read_start(path).split("\n")[:_SEARCHED]
     except (OSError, FileError, UnicodeError):
-        return None
-    return _stated_in(_above_numbers(lines))
-
-
-def _above_numbers(lines: list[str]) -> list[str]:
-    """Return the lines above the first one of numbers; all where none is."""
+        return []
     try:
         dialect = dialect_of(lines, lambda _: None)
     except FileError:
@@ -67,16 +77,18 @@ def _above_numbers(lines: list[str]) -> list[str]:
 
 
 def _stated_in(lines: Iterable[str]) -> StatedRate | None:
+    """Return what lines state, with NaN where that is no rate; None where they state nothing, or several rates."""
     found = [
         StatedRate(rate, printable(" ".join(line.strip(" \t\r,;").split()), 60))
         for line in lines
         if (rate := _rate_in(line)) is not None
     ]
-    return found[0] if len({one.rate for one in found}) == 1 else None
+    rates = [one for one in found if not math.isnan(one.rate)]
+    return next(iter(rates or found), None) if len({one.rate for one in rates}) <= 1 else None
 
 
 def _rate_in(line: str) -> float | None:
-    """Return the samples per second of a line that states them, or seconds per sample, and nothing else."""
+    """Return the samples per second of a line that states them, or seconds per sample, and nothing else; NaN where they cannot be."""
     for pattern, is_rate in ((_RATE, True), (_PERIOD, False)):
         said = pattern.match(line)
         if said is None:
@@ -87,14 +99,15 @@ def _rate_in(line: str) -> float | None:
         between = r"[\s:;=\",]+" if _BEHIND_NAME.match(rest) else r"[\s:;=\"]+"
         cells = [one.strip("[](){}") for one in re.split(f"{between}|{_BEFORE_UNIT}", rest, flags=re.IGNORECASE)]
         numbers = {
-            cell: value for cell in cells if (value := number(cell, comma=True)) is not None and cell[:1].isdigit()
+            cell: value for cell in cells if (value := number(cell, comma=True)) is not None and _NUMBER.match(cell)
         }
         units = {cell for cell in cells if cell and cell not in numbers and cell.lower() != "in"}
         values = set(numbers.values())
         value = values.pop() if len(values) == 1 else None
-        if value is None or not value > 0 or any(decimal_sign(cell) == "?" for cell in numbers) or len(units) > 1:
+        if value is None or any(decimal_sign(cell) == "?" for cell in numbers) or len(units) > 1:
             return None
         if said.groupdict().get("short") and not units:
             return None
-        return rate_of(value, next(iter(units), ""), is_rate=is_rate)
+        rate = rate_of(value if value > 0 else 1.0, next(iter(units), ""), is_rate=is_rate)
+        return rate if value > 0 or rate is None else math.nan
     return None

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tvident._files import FileError, FileWarning, copy_text, printable, stated_rate
+from tvident._files import FileError, FileWarning, copy_text, no_rate_stated, printable, stated_rate
 from tvident._in_pieces.file_rows import ColumnOfRows, RowsOfFile
 from tvident._in_pieces.recorded import check_same
-from tvident._in_pieces.said import NOTHING_SAID, SaidOfRate
+from tvident._in_pieces.said import SaidOfRate
 from tvident._in_pieces.sources import Source
 
 
@@ -43,5 +43,5 @@ def copied(path: Path, folder: Path, mark: str) -> Source:
     together = RowsOfFile(rows, 0, number, len(names))
     columns = {name: (ColumnOfRows(together, place), samples) for place, name in enumerate(names) if name is not None}
     stated = stated_rate(path)
-    rate = NOTHING_SAID if stated is None else SaidOfRate(stated.rate, text=path)
+    rate = SaidOfRate(None, wrong=no_rate_stated(path)) if stated is None else SaidOfRate(stated.rate, text=path)
     return Source(columns, lambda: None, printable(path), rate)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tvident._files import FileRecording, RatesDifferError
+from tvident._files import FileRecording, RatesDifferError, check_alike, no_rate_told, told_rates
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,8 @@ class SaidOfRate:
     rate: float | None
     remarks: tuple[str, ...] = ()
     text: Path | None = None
+    wrong: str = ""
+    """What it says of them that is no sample rate."""
 
 
 NOTHING_SAID = SaidOfRate(None)
@@ -38,12 +40,10 @@ def said_of_rate(attributes: Callable[[list[str]], Iterator[tuple[str, Any]]], s
     The attributes are given as a channel by a function, which adds to a list what it does not read.
     """
     remarks: list[str] = []
-    numbers = {**dict(attributes(remarks)), **single}
+    numbers = FileRecording({**dict(attributes(remarks)), **single})
+    rates = told_rates(numbers)
     try:
-        rate = FileRecording(numbers, source="the file").sample_rate
+        check_alike(rates, "the file")
     except RatesDifferError as error:
-        rate = None
-        remarks.append(str(error))
-    except ValueError:
-        rate = None
-    return SaidOfRate(rate, tuple(map(str, remarks)))
+        return SaidOfRate(None, (*map(str, remarks), str(error)))
+    return SaidOfRate(next(iter(rates.values()), None), tuple(map(str, remarks)), wrong=no_rate_told(numbers))

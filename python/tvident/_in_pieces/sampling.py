@@ -53,8 +53,9 @@ def begin_and_period(
         _say_other_rate(source, times, said.rate)
         return _first_time(source, clock, samples, said.rate), 1 / said.rate
     several = f"several channels of times ({listed(times)})" if len(times) > 1 else "no channel of times"
+    wrong = said.wrong and f"; {said.wrong}"
     raise TypeError(
-        f"an identification needs the sample period; {source.place} has {several}; give sample_rate=, delta= or t="
+        f"an identification needs the sample period; {source.place} has {several}{wrong}; give sample_rate=, delta= or t="
     )
 
 
