@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import subprocess
 import sys
 
@@ -52,3 +53,13 @@ def test_nothing_is_loaded_that_is_not_needed(code: str, forbidden: set[str]) ->
     assert not forbidden & set(loaded)
     rooms = {name for name in loaded if name in {"tvident._report", "tvident._figures", "tvident._commands"}}
     assert not rooms
+
+
+@pytest.mark.parametrize("room", ["tvident._files", "tvident._formats"])
+def test_rooms_that_enter_their_files_late_know_each_name(room: str) -> None:
+    """A name that nobody had assigned came from the file on netCDF."""
+    module = importlib.import_module(room)
+    assert all(hasattr(module, name) for name in module.__all__)
+    assert set(module._READERS) <= set(module.__all__)  # noqa: SLF001 - where names come from
+    with pytest.raises(AttributeError, match=f"module '{room}' has no attribute 'unknown'"):
+        _ = module.unknown

@@ -41,15 +41,17 @@ __all__ = [
     "zarr_rate",
 ]
 
-_OTHERS = {
+_READERS = {
     "columns_of": "columns",
     **dict.fromkeys(("datasets", "hdf5_arrays", "hdf5_rate"), "hdf5"),
+    **dict.fromkeys(("NetcdfMeaning", "is_netcdf_3", "netcdf_3_rate", "netcdf_4_rate", "netcdf_columns"), "netcdf"),
+    **dict.fromkeys(("netcdf_meaning", "numbers_of_netcdf_3", "numbers_of_netcdf_4"), "netcdf"),
     **dict.fromkeys(("zarr_found", "zarr_rate"), "zarr_arrays"),
 }
+"""Where what reads comes from: entered when first asked for, since most recordings are of other formats."""
 
 
 def __getattr__(name: str) -> Any:
-    """Enter a reader when it is first asked for: most recordings are of other formats."""
-    if name not in __all__:
+    if name not in _READERS:
         raise AttributeError(f"module 'tvident._formats' has no attribute {name!r}")
-    return getattr(import_module(f"tvident._formats.{_OTHERS.get(name, 'netcdf')}"), name)
+    return getattr(import_module(f"tvident._formats.{_READERS[name]}"), name)
