@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from tvident._arguments import MAY_BE_DAYS, listed, marks_in, told_once
+from tvident._arguments import listed, marks_in, may_be_days, told_once
 from tvident._results import Estimates, Words
 from tvident._units import ROTARY, Axis
 
@@ -108,7 +108,7 @@ class Plausible:
     def _slow(self) -> list[str]:
         if "time" not in self.axis.assumed:
             return []
-        if self.period <= MAY_BE_DAYS:
+        if may_be_days(self.period):
             return [
                 f"there is one sample in {self.period:.4g} s: is the time in days? Then give time_unit='days' with t= or delta="
             ]

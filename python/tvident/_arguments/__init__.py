@@ -41,12 +41,13 @@ from tvident._arguments.paths import path_of
 from tvident._arguments.progress import Progress, WatchedProgress, reporter
 from tvident._arguments.ranges import finite, percentiles, told_once
 from tvident._arguments.sampling import (
-    MAY_BE_DAYS,
+    TOO_SHORT,
     check_power,
     check_window,
     delay,
     in_unit_of_time,
     length_given,
+    may_be_days,
     sample_period,
     seconds,
     window_length,
@@ -70,7 +71,7 @@ from tvident._choices import NanPolicy, RowPolicy
 __all__ = [
     "CLOSE_TO_MARK",
     "LARGEST",
-    "MAY_BE_DAYS",
+    "TOO_SHORT",
     "Labels",
     "NanPolicy",
     "NotUniformError",
@@ -118,6 +119,7 @@ __all__ = [
     "mapping",
     "marks_in",
     "mask",
+    "may_be_days",
     "nearest",
     "one_of",
     "ordinal",

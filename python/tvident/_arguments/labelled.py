@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvident._arguments.containers import package_of
-from tvident._arguments.sampling import MAY_BE_DAYS
+from tvident._arguments.sampling import may_be_days
 from tvident._arguments.times import times_of
 from tvident._units import ROTARY, factor_to, is_convertible, named_unit, times_in_seconds, unit_said
 
@@ -69,7 +69,7 @@ def _cure_of_unit(name: Any, step: float) -> str:
     if unit:
         # A unit of time would have been read.
         return f" and time_unit='ms', say: {unit!r} is no unit of time, or may mean several"
-    if step <= MAY_BE_DAYS:
+    if may_be_days(step):
         return f" and time_unit='days' if they are days ({1 / (86_400 * step):.6g} Hz)"
     return f" if they are seconds ({1 / step:.6g} Hz), and time_unit='ms' too if they are milliseconds"
 

@@ -17,8 +17,13 @@ from tvident._units import times_in_seconds
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0}
 
 
-MAY_BE_DAYS = 2e-7
-"""A sample period in seconds, 5 MHz, up to which it may be in days, as spreadsheets and datenum count: 60 Hz or more."""
+TOO_SHORT = 2e-7
+"""A sample period in seconds, 5 MHz, that no recorder of motion has: it may be in days, as spreadsheets and datenum count."""
+
+_DAY = 86_400.0
+
+_WHOLE = 1e-4
+"""By how much whole samples a second may be off, beside what the digits of times leave open."""
 
 _SHORTEST, _LONGEST = 1e-30, 1e30
 """Sample periods in seconds: nothing is recorded faster or more slowly, and beyond them numbers leave the range of doubles."""
@@ -47,6 +52,17 @@ def sample_period(
     if t is not None:
         return _possible("the step of t", period_of_times(times_in_seconds(t), samples))
     return 1.0 if delta is None else _possible("delta", positive_number("delta", delta))
+
+
+def may_be_days(step: float, rounded: float = 0.0) -> bool:
+    """Return whether equal steps of times, taken as seconds, may be in days: shorter than any recorder's, or whole samples a second.
+
+    Rates of 86.4 kHz and its multiples are those of no recorder. Of the step so much may be rounded, as a part of it.
+    """
+    if not step > 0:
+        return False
+    rate = 1 / (_DAY * step)
+    return step <= TOO_SHORT or (round(rate) >= 1 and abs(rate - round(rate)) < _WHOLE + rounded * rate)
 
 
 def in_unit_of_time(delta: Any, factor: float) -> float | None:

@@ -16,6 +16,7 @@ from tvident._files.clock_columns import with_clocks_in_columns
 from tvident._files.counts import said_of_counts
 from tvident._files.names import printable
 from tvident._files.no_values import marks_given, said_of_marks, without_marks
+from tvident._files.serial_days import with_days
 from tvident._files.split_clock import with_whole_clocks
 from tvident._files.unpacked import ending_of
 from tvident._formats import FOLDERS, FORMATS
@@ -160,6 +161,7 @@ def read(path: str | Path, *, missing: float | Sequence[float] = ()) -> Channels
         raise FileError(f"{place}: cannot be read ({error.strerror or error}); check that it is whole") from None
     channels = {name: without_marks(values, marks) for name, values in channels.items()} if marks else channels
     channels = with_whole_clocks(with_clocks_in_columns(channels, said.append), said.append)
+    channels = with_days(channels, said.append)
     said += said_of_marks(channels) + list(said_of_counts(channels))
     for message in said:
         warnings.warn(f"{place}: {message}", FileWarning, stacklevel=2)

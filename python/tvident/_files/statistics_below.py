@@ -68,7 +68,7 @@ def _may_hold(columns: npt.NDArray[np.float64]) -> bool:
         # Of so many more rows.
         near = 2 * count / values.size * float(np.ptp(values))
         middle = (float(values.mean()), float(values.std()))
-        within = near + np.array([_half_digit(one) for one in last.tolist()])
+        within = near + np.array([half_digit(one) for one in last.tolist()])
         if not any((np.abs(last - one) <= within).any() for one in middle):
             return False
     return True
@@ -82,7 +82,7 @@ def _statistic(above: npt.NDArray[np.float64], row: npt.NDArray[np.float64]) -> 
     first = above[places[0]]
     # One column excludes nearly all rows that are samples, before others are summed.
     for name, value, error in _statistics(first[np.isfinite(first)]):
-        if abs(row[places[0]] - value) <= error + _half_digit(row[places[0]]) and _is_of_all(above, row, places, name):
+        if abs(row[places[0]] - value) <= error + half_digit(row[places[0]]) and _is_of_all(above, row, places, name):
             return name
     return ""
 
@@ -94,9 +94,9 @@ def _is_of_all(
     for place in places:
         values = above[place][np.isfinite(above[place])]
         within = [
-            error + _half_digit(row[place])
+            error + half_digit(row[place])
             for called, value, error in _statistics(values)
-            if called == name and abs(row[place] - value) <= error + _half_digit(row[place])
+            if called == name and abs(row[place] - value) <= error + half_digit(row[place])
         ]
         if not within:
             return False
@@ -108,7 +108,7 @@ def _statistics(values: npt.NDArray[np.float64]) -> Iterator[tuple[str, float, f
     """Give the statistics of numbers: their names, themselves, and how far they are off since numbers were rounded when written."""
     if not values.size:
         return
-    count, half = values.size, max(map(_half_digit, values[:_MOST].tolist()))
+    count, half = values.size, max(map(half_digit, values[:_MOST].tolist()))
     # Rounded numbers are off by a third of half a digit's square on average, in either direction.
     mean, of_mean = float(values.mean()), 4 * half / np.sqrt(3 * count)
     rounding = 8 * np.finfo(np.float64).eps * float(np.abs(values).max())
@@ -123,7 +123,7 @@ def _statistics(values: npt.NDArray[np.float64]) -> Iterator[tuple[str, float, f
     yield "median", float(np.median(values)), half + rounding
 
 
-def _half_digit(value: float) -> float:
+def half_digit(value: float) -> float:
     """Return half of the last decimal digit that a number was written with, as far as the number tells."""
     digits = next((digits for digits in range(_MOST_DIGITS) if round(value, digits) == value), _MOST_DIGITS)
     return 0.5 * 10.0**-digits

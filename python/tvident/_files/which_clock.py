@@ -99,11 +99,11 @@ def check_no_counts(first: float, step: float, unit_said: str, cure: str = "give
         raise ValueError(
             f"the first, {words}; call the channel 'time [{unit}]', or {cure.format(unit)}, if it counts such since 1970"
         )
-    if 0 < step <= arguments.MAY_BE_DAYS and unit_said:
+    if 0 < step <= arguments.TOO_SHORT and unit_said:
         raise ValueError(
             f"one sample in {step:.4g} s would be {1 / step:.4g} Hz; check whether the channel is in {unit_said}, and call it by its unit"
         )
-    if 0 < step <= arguments.MAY_BE_DAYS:
+    if not unit_said and arguments.may_be_days(step):
         raise ValueError(
             f"one sample in {step:.4g} s would be {1 / step:.4g} Hz; call the channel 'time [days]', or {cure.format('days')}, if "
             "it counts days, as datenum of MATLAB and spreadsheets do"
