@@ -70,3 +70,24 @@ def test_words_behind_every_number_are_no_comments(tmp_path: Path) -> None:
     path.write_text("\n".join(["angle,load", *(f"{place}.25,{place % 7} % load" for place in range(40)), ""]))
     with pytest.raises(recordings.FileError, match=r"'0 % load' in line 2 is no number.*; begin comments with #"):
         recordings.read(path)
+
+
+@pytest.mark.parametrize(
+    ("head", "rows", "words"),
+    [
+        ("time,remark,angle,torque", "{0:.3f},{1},{2:.6f},1.5", "0 % load"),
+        ("time;remark;angle;torque", "{0:.3f};{1};{2:.6f};1,5", "0,0 % load"),
+        ("time\tangle\tremark\ttorque", "{0:.3f}\t{2:.6f}\t{1}\t1,5", "0,0 // load"),
+    ],
+)
+@pytest.mark.parametrize("place", [5, 900])
+def test_a_remark_between_numbers_is_no_comment(tmp_path: Path, head: str, rows: str, words: str, place: int) -> None:
+    """The cells behind it were cut off, and the text was refused: "every line must have 4 cells; line 7 has 2"."""
+    path = tmp_path / "x.txt"
+    lines = [rows.format(number / 1000, words if number == place else "", 0.5) for number in range(1500)]
+    lines = [line.replace(".", ",") if ";" in head or "\t" in head else line for line in lines]
+    path.write_text("\n".join([head, *lines]) + "\n")
+    with pytest.warns(recordings.FileWarning, match="'remark': not read, it holds words"):
+        channels = recordings.read(path)
+    assert {name: values.size for name, values in channels.items()} == {"time": 1500, "angle": 1500, "torque": 1500}
+    assert channels["torque"][place] == 1.5

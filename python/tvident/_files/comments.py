@@ -20,7 +20,10 @@ _BEGINS_AS_NUMBER = re.compile(r"[ \t]*[-+.]?\d")
 
 _CELL = re.compile(r"[^\s,;|\"']+")
 
-_SEPARATORS = ",;\t|"
+_SEPARATORS = ";\t|,"
+"""Those that can be nothing else come first."""
+
+_BETWEEN_BLANKS = re.compile(r"\d[ ]+[-+.\d]")
 
 _LONGEST_ERROR = 20
 """Characters of what a spreadsheet writes where there is no number."""
@@ -42,6 +45,10 @@ class Comments:
         empty = sum(line.endswith((",", ";", "\t", "|")) for line in rows)
         self._are_column = max(found, empty) > _MOSTLY * len(rows)
         self._usual = {one: int(np.median([line.count(one) for line in rows])) for one in _SEPARATORS if rows}
+        self._separator = next((one for one in _SEPARATORS if self._usual.get(one)), None)
+        # A comma may be a decimal sign where blanks separate cells, too.
+        if self._separator == "," and any(_BETWEEN_BLANKS.search(line) for line in rows):
+            self._separator = None
         self._above: frozenset[str] = frozenset()
 
     def repeat(self, above: Iterable[str]) -> None:
@@ -52,7 +59,12 @@ class Comments:
         """Return a text in which # begins what is behind numbers."""
         if self._are_column or not _may_hold(text):
             return text
-        return _BEHIND.sub(lambda one: f"{self._row(one['row'])}#" if _is_row(one) else one[0], text)
+        return _BEHIND.sub(lambda one: f"{self._row(one['row'])}#" if self._is_whole(one) else one[0], text)
+
+    def _is_whole(self, found: re.Match[str]) -> bool:
+        """Return whether what stands before a mark is a row, and not cells of it before one of words, as in ``0.5,0 % load,1.2``."""
+        is_short = self._separator is not None and found["row"].count(self._separator) < self._usual[self._separator]
+        return _is_row(found) and not is_short
 
     def _row(self, row: str) -> str:
         """Return numbers without the separator that only the comment behind them has."""
