@@ -364,3 +364,34 @@ def test_several_records_are_drawn_together() -> None:
         found.plot("poles")
     with pytest.raises(ValueError, match=r"1 to 24 records; got 25; draw some: result\[:24\]"):
         figures.plot_records([batch[0]] * 25)
+
+
+def test_the_truth_is_drawn_from_names_too(result: tvident.Identification, rig: tvident.Recording) -> None:
+    """It was left out without a word."""
+    stiffness, _ = result.plot(truth=rig.truth).axes
+    assert f"(truth {rig.inertia[0]:.5g})" in texts(stiffness)
+    interpolated = line(result.plot(truth=rig).axes[0], "truth")[1]
+    # Times of the recording differ from those of the result by rounding.
+    np.testing.assert_allclose(line(stiffness, "truth")[1], interpolated, rtol=1e-14)
+    known = figures.plot_identification(result, {"inertia": 0.012}).axes[0]
+    assert "(truth 0.012)" in texts(known)
+
+
+@pytest.mark.parametrize(
+    ("truth", "said"),
+    [
+        (3.0, "must be a simulated recording, or numbers and arrays by name; got 3.0"),
+        (np.ones(8000), "must be a simulated recording, or numbers and arrays by name"),
+        (
+            {"stifness": 1.0},
+            "must name parameters of the result, inertia, damping, stiffness and offset; got 'stifness'",
+        ),
+        (
+            {"stiffness": np.ones(7)},
+            r"'stiffness'\] must be a number or an array with a value for each of 8000 samples; got shape \(7,\)",
+        ),
+    ],
+)
+def test_what_is_no_truth_is_refused(result: tvident.Identification, truth: Any, said: str) -> None:
+    with pytest.raises((TypeError, ValueError), match=said):
+        result.plot(truth=truth)

@@ -9,6 +9,7 @@ from tvident._arguments import whole_number
 from tvident._figures.parameters import DrawableResult, check_single, draw_parameters, unknowns
 from tvident._figures.recording import plot_recording
 from tvident._figures.style import Place
+from tvident._figures.truth import Truth
 from tvident._figures.window import plot_window
 from tvident._simulate import Recording
 
@@ -142,15 +143,16 @@ def _window(
     return plot_window(recording.angle + noise, middle, sample_rate=recording.sample_rate, ax=ax)
 
 
-def paper_figure_6(result: DrawableResult, truth: Recording | None = None, ax: Place = None) -> Figure:
+def paper_figure_6(result: DrawableResult, truth: Truth = None, ax: Place = None) -> Figure:
     """Draw inertia, damping and stiffness over time in a panel each, whatever is constant: figure 6 of the paper.
 
     Parameters
     ----------
     result : Identification
         Of a single record, with ``method="paper"`` for the paper's numbers.
-    truth : Recording, optional
-        A simulated recording: its true values are drawn too, and the error of what was found below each.
+    truth : Recording or mapping of str to array_like, optional
+        A simulated recording, or true numbers or arrays by the names of parameters: they are drawn too, and the error of what was found
+        below each.
     ax : sequence of Axes, optional
         Where to draw. By default a new figure.
 
@@ -161,7 +163,7 @@ def paper_figure_6(result: DrawableResult, truth: Recording | None = None, ax: P
     Raises
     ------
     ValueError
-        If the result holds several records.
+        If the result holds several records, or `truth` is none of this result.
 
     See Also
     --------

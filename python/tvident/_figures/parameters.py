@@ -29,7 +29,7 @@ from tvident._figures.style import (
     style,
     unit_of,
 )
-from tvident._simulate import Recording
+from tvident._figures.truth import Truth, truth_at
 from tvident._status import DOUBTFUL, Status, stretches_of
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -69,7 +69,7 @@ def check_single(result: DrawableResult) -> None:
         )
 
 
-def plot_identification(result: DrawableResult, truth: Recording | None = None, ax: Place = None) -> Figure:
+def plot_identification(result: DrawableResult, truth: Truth = None, ax: Place = None) -> Figure:
     """Draw time-varying parameters with bands of two standard errors; constants are one line of text.
 
     Scales leave out a hundredth of the values on each side, so that a spike does not hide the rest. Grey stretches have flags, as many
@@ -79,8 +79,9 @@ def plot_identification(result: DrawableResult, truth: Recording | None = None, 
     ----------
     result : Identification
         Of a single record.
-    truth : Recording, optional
-        A simulated recording: its true values are drawn too, and the error of what was found below each.
+    truth : Recording or mapping of str to array_like, optional
+        A simulated recording, or true numbers or arrays by the names of parameters: they are drawn too, and the error of what was found
+        below each.
     ax : Axes or sequence of Axes, optional
         Where to draw; one Axes is divided if there are several panels. By default a new figure.
 
@@ -91,7 +92,7 @@ def plot_identification(result: DrawableResult, truth: Recording | None = None, 
     Raises
     ------
     ValueError
-        If the result holds several records, or there are too many or too few axes.
+        If the result holds several records, there are too many or too few axes, or `truth` is none of this result.
 
     See Also
     --------
@@ -121,10 +122,10 @@ def unknowns(result: DrawableResult) -> list[str]:
     return [name for name in (*_SYMBOLS, *result.terms) if result.settings["kinds"][name] != "known"]
 
 
-def draw_parameters(result: DrawableResult, shown: list[str], truth: Recording | None, ax: Place) -> Figure:
+def draw_parameters(result: DrawableResult, shown: list[str], truth: Truth, ax: Place) -> Figure:
     """Draw parameters over time in panels of their own, and those that are constant as text above."""
-    of_truth = {name: getattr(truth, name) for name in shown if truth is not None and hasattr(truth, name)}
-    constants = _constants(result, truth)
+    of_truth = truth_at(np.asarray(result.time), truth, (*_SYMBOLS, *result.terms))
+    constants = _constants(result, of_truth)
     heights = [height for name in shown for height in ([2.1, 0.9] if name in of_truth else [2.1])]
     with style():
         figure, axes = panels(ax, heights or [1.0 + 0.3 * len(constants)])
@@ -139,8 +140,8 @@ def draw_parameters(result: DrawableResult, shown: list[str], truth: Recording |
             draw_parameter(panel, result.time, values, result.stderr[name])
             panel.set_title(title_of(name))
             panel.set_ylabel(unit_of(name, result.units))
-            if truth is not None and name in of_truth:
-                true = np.interp(result.time, truth.time, of_truth[name])
+            if name in of_truth:
+                true = of_truth[name]
                 draw_line(panel, result.time, true, color=TRUTH, linewidth=1.1, linestyle=(0, (5, 2)), label="truth")
                 _draw_error(next(rest), result, name, values - true)
         if constants:
@@ -166,13 +167,13 @@ def title_of(name: str) -> str:
     return _SYMBOLS.get(name, plain(name.replace("_", " ").capitalize()))
 
 
-def _constants(result: DrawableResult, truth: Recording | None) -> list[str]:
+def _constants(result: DrawableResult, of_truth: Mapping[str, Array]) -> list[str]:
     """Return what is constant, in words."""
     words = []
     for name, (value, error) in result.constants.items():
         line = f"{title_of(name)}: {arguments.with_error(value, error)} {unit_of(name, result.units)}".rstrip()
-        if truth is not None and hasattr(truth, name):
-            line += f" (truth {np.mean(getattr(truth, name)):.5g})"
+        if name in of_truth:
+            line += f" (truth {np.mean(of_truth[name]):.5g})"
         words.append(line)
     return words
 
