@@ -395,3 +395,30 @@ def test_the_truth_is_drawn_from_names_too(result: tvident.Identification, rig: 
 def test_what_is_no_truth_is_refused(result: tvident.Identification, truth: Any, said: str) -> None:
     with pytest.raises((TypeError, ValueError), match=said):
         result.plot(truth=truth)
+
+
+def test_dask_is_never_computed_for_a_picture(result: tvident.Identification, rig: tvident.Recording) -> None:
+    """It was, by pictures, channels and recordings of files."""
+    da = pytest.importorskip("dask.array")
+    computed = []
+
+    def watched(block: Any) -> Any:
+        computed.append(1)
+        return block
+
+    lazy = da.from_array(rig.angle).map_blocks(watched, dtype=float, meta=np.empty(0))
+    computed.clear()  # of what is asked for its type
+    fit = tvident.fit_local_polynomials(rig.angle, 101)
+    for call in (
+        lambda: figures.plot_recording({"angle": lazy}, sample_rate=1000),
+        lambda: figures.plot_derivatives(rig.time, fit, samples=lazy),
+        lambda: result.plot("over", position=lazy),
+        lambda: result.plot(truth={"stiffness": lazy}),
+        lambda: tvident.Channel(lazy, "rad"),
+        lambda: tvident.FileRecording({"angle": lazy}),
+    ):
+        with pytest.raises(
+            TypeError, match=r"must be in memory; got a dask .*never computed silently; pass .*\.compute\(\)"
+        ):
+            call()
+    assert not computed

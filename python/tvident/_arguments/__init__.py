@@ -11,7 +11,7 @@ from tvident._arguments.arrays import (
     weights,
 )
 from tvident._arguments.channels import as_record, channel, channels
-from tvident._arguments.containers import fields_of, is_table, package_of, plain, time_axis
+from tvident._arguments.containers import check_in_memory, fields_of, is_table, package_of, plain, time_axis
 from tvident._arguments.digits import explained_in_words, ordinal, own_digits, percent, to_digits_of, with_error
 from tvident._arguments.labelled import (
     check_against_labels,
@@ -87,6 +87,7 @@ __all__ = [
     "channel",
     "channels",
     "check_against_labels",
+    "check_in_memory",
     "check_nan",
     "check_no_counts",
     "check_no_lost_samples",

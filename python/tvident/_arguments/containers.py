@@ -36,17 +36,31 @@ def is_table(values: object) -> bool:
     return package_of(values) in {"pandas", "polars"} and hasattr(values, "columns")
 
 
-def plain(name: str, values: Any) -> Any:
-    """Return what NumPy makes an array of, at once and without a loss: missing values are NaN, times are those of UTC."""
+def check_in_memory(name: str, values: Any) -> None:
+    """Refuse what is computed or read only when it is asked for: that may be larger than memory.
+
+    Raises
+    ------
+    TypeError
+        If it is a collection of dask, a lazy frame of polars, or what xarray made of one.
+    """
     package = package_of(values)
     if package == "dask":
         raise TypeError(_lazy(name, "a dask array" if hasattr(values, "chunks") else "a dask collection", ".compute()"))
+    if package == "polars" and not isinstance(values, type) and not hasattr(values, "to_numpy"):
+        raise TypeError(_lazy(name, f"a polars {type(values).__name__}", ".collect()"))
+    if package == "xarray" and not hasattr(values, "data_vars") and getattr(values, "chunks", None):
+        raise TypeError(_lazy(name, "a dask array", ".load()"))
+
+
+def plain(name: str, values: Any) -> Any:
+    """Return what NumPy makes an array of, at once and without a loss: missing values are NaN, times are those of UTC."""
+    check_in_memory(name, values)
+    package = package_of(values)
     if package == "pandas" and (hasattr(values, "dtype") or hasattr(values, "dtypes")):
         _check_one_record(name, values)
         return _of_pandas(values)
     if package == "polars" and not isinstance(values, type):
-        if not hasattr(values, "to_numpy"):
-            raise TypeError(_lazy(name, f"a polars {type(values).__name__}", ".collect()"))
         return values.to_numpy()
     if package == "xarray":
         return _of_xarray(name, values)
@@ -133,8 +147,6 @@ def _of_xarray(name: str, values: Any) -> npt.NDArray[Any]:
         got = f"a Dataset of {', '.join(variables[:_MOST_NAMES])}" if variables else shown(values)
         one = variables[0] if variables else "angle"
         raise TypeError(f"{name} must be one channel; got {got}; take one variable: {name}[{one!r}]")
-    if getattr(values, "chunks", None):
-        raise TypeError(_lazy(name, "a dask array", ".load()"))
     return np.asarray(values.values)
 
 

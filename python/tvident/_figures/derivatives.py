@@ -9,6 +9,7 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from tvident import _arguments as arguments
 from tvident._derivatives import LocalPolynomialFit
 from tvident._figures.style import INK, MUTED, Place, draw_parameter, legend, panels, plain, scale, style
 from tvident._units import derivative_units, unit_said
@@ -71,6 +72,7 @@ def plot_derivatives(
     if fit.order.ndim != 1:
         raise ValueError(f"only a single record can be drawn; this one has shape {fit.order.shape}; take one record")
     count = fit.derivatives.shape[0]
+    arguments.check_in_memory("samples", samples)
     raw = None if samples is None else np.asarray(samples, np.float64)
     if raw is not None and raw.shape != time.shape:
         raise ValueError(

@@ -293,6 +293,7 @@ def plot_over_position(
         raise ValueError(
             f"name must be a parameter of the result; got {name!r}; give one of {(*_SYMBOLS, *result.terms)}"
         )
+    arguments.check_in_memory("position", position)
     places = np.asarray(position, np.float64)
     if places.shape != result.time.shape:
         raise ValueError(

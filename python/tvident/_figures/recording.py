@@ -67,6 +67,8 @@ def plot_recording(
             "angle [rad]": recording.angle,
         }
     else:
+        for name, one in recording.items():
+            arguments.check_in_memory(f"recording[{name!r}]", one)
         named = {with_unit(name, "" if named_unit(name)[1] else unit_said(one)): one for name, one in recording.items()}
         channels = {name: np.asarray(values) for name, values in named.items() if np.ndim(values)}
         time = _time(channels, sample_rate)

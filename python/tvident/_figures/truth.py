@@ -43,7 +43,7 @@ def truth_at(time: npt.NDArray[np.float64], truth: Truth, known: Collection[str]
                 f"truth must name parameters of the result, {arguments.listed(list(known))}; got {arguments.shown(name)}; check it"
             )
         called = f"truth[{name!r}]"
-        is_number = np.ndim(np.asarray(value)) == 0
+        is_number = np.ndim(value) == 0
         values = np.asarray(
             arguments.finite_number(called, value) if is_number else arguments.real_array(called, value)
         )

@@ -91,6 +91,8 @@ class FileRecording(Mapping[str, Channel]):
             raise TypeError(
                 f"channels must be a mapping of names to samples; got {arguments.shown(channels)}; write {{'angle [deg]': samples}}, say"
             )
+        for name, values in channels.items():
+            arguments.check_in_memory(f"channels[{name!r}]", values)
         full = {str(name): np.asarray(values) for name, values in channels.items()}
         bare = [named_unit(name)[0] for name in full]
         self._channels: dict[str, Channel] = {}

@@ -67,6 +67,12 @@ class Channel(np.ndarray[Any, Any]):
     def __new__(cls, samples: npt.ArrayLike, unit: str = "") -> Self:
         """Give samples a unit, without a copy."""
         _check_text(unit)
+        graph = getattr(samples, "__dask_graph__", None)
+        if graph is not None and graph() is not None:
+            raise TypeError(
+                "samples must be in memory; got a dask collection, which may be larger than memory and is never computed silently; pass "
+                "samples.compute()"
+            )
         try:
             channel = np.asarray(samples).view(cls)
         except ValueError:
