@@ -67,6 +67,20 @@ def test_means_below_an_empty_cell_of_the_times_are_none_either(tmp_path: Path) 
     assert recordings.read(path)["angle [deg]"].size == len(rows) + 1
 
 
+@pytest.mark.parametrize("functions", [[np.mean, np.std], [np.min, np.max, np.mean, np.std]], ids=["two", "four"])
+def test_several_rows_of_statistics_need_no_times(tmp_path: Path, functions: list[Any]) -> None:
+    """Nothing but times told them, and each was a sample."""
+    rows = np.round(COLUMNS[:, 1:], 5)
+    path = tmp_path / "run.csv"
+    below = np.array([function(rows, axis=0) for function in functions])
+    path.write_text("\n".join(["angle [deg],torque [N m]", *_text(rows), *_text(below)]))
+    with pytest.warns(recordings.FileWarning, match=f"the last {len(functions)} rows hold the"):
+        assert recordings.read(path)["angle [deg]"].size == len(rows)
+    # The same one twice is what a machine at rest has.
+    path.write_text("\n".join(["angle [deg],torque [N m]", *_text(rows), *_text(below[:1]), *_text(below[:1])]))
+    assert recordings.read(path)["angle [deg]"].size == len(rows) + 2
+
+
 def _slow_ramp() -> npt.NDArray[Any]:
     steps = np.minimum(np.arange(400) // 3, 132)
     return np.stack([steps * 1.0, steps * 2.0], axis=1)

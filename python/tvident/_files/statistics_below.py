@@ -21,27 +21,33 @@ _BY_CHANCE = 1e-3
 _TELLING = frozenset({"mean", "standard deviation"})
 """Of which the rows below hold one."""
 
+_WITHOUT_TIMES = 2
+"""Rows, each another statistic, that tell themselves: one alone may be the sample with which a motion ends at its mean."""
+
 _MOST_DIGITS = 17
 
 
 def without_statistics(columns: npt.NDArray[np.float64], say: Say) -> npt.NDArray[np.float64]:
     """Return columns, shape (columns, samples), without the last rows where each holds one statistic of all rows above, which is said.
 
-    Only behind times that go on up to there and no further: where no column tells it, the last sample may be near the mean of all.
+    Behind times only where these go on up to there and no further; without times only where several rows hold a statistic each, for a
+    last sample may be near the mean of all.
     """
     samples = columns.shape[1]
     if samples <= _FEWEST_SAMPLES or not _may_hold(columns):
         return columns
     for rows in range(min(_MOST, samples - _FEWEST_SAMPLES), 0, -1):
-        if not _times_end(columns, rows):
+        ends = _times_end(columns, rows)
+        if not ends and (rows < _WITHOUT_TIMES or _has_times(columns[:, :-rows])):
             continue
         above, names = columns[:, :-rows], []
         for place in range(samples - rows, samples):
             names.append(_statistic(above, columns[:, place]))
             if not names[-1]:
                 break
+        is_told = ends or len(set(names)) == rows
         # The greatest of all rows may be the last sample of a ramp.
-        if names[-1] and _TELLING.intersection(names):
+        if names[-1] and is_told and _TELLING.intersection(names):
             said = "the last row holds" if rows == 1 else f"the last {rows} rows hold"
             say(f"{said} the {', '.join(names)} of the rows above: not read, as no samples")
             return above
@@ -53,6 +59,10 @@ def _times_end(columns: npt.NDArray[np.float64], rows: int) -> bool:
     above, first = columns[:, :-rows], columns[:, -rows]
     is_clock = np.array([bool((np.diff(column) > 0).all()) for column in above])
     return bool((is_clock & ~(first > above[:, -1])).any())
+
+
+def _has_times(columns: npt.NDArray[np.float64]) -> bool:
+    return any(bool((np.diff(column) > 0).all()) for column in columns)
 
 
 def _may_hold(columns: npt.NDArray[np.float64]) -> bool:
