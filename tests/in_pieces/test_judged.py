@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import pickle
 from collections.abc import Callable
@@ -165,4 +166,6 @@ def test_npy_waits_for_who_reads_the_verdict(tmp_path: Path, monkeypatch: pytest
     assert found[0].verdict == other.verdict == told["verdict"] == "do not trust: inertia is negative; see what to do"
     assert [*found[0].advice] == [*other.advice] == told["advice"]
     assert pickle.loads(pickle.dumps(found[1])).summary() == found[0].summary()  # noqa: S301 - its own
+    moved = dataclasses.replace(pickle.loads(pickle.dumps(found[1])), path=tmp_path)  # noqa: S301 - its own
+    assert moved.verdict == found[0].verdict
     assert len(asked) == 3

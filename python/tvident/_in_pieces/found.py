@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -100,11 +100,14 @@ class FileIdentification:
 
     @cached_property
     def _judged(self) -> tuple[str, tuple[str, ...]]:
-        return self._judge()
+        judged = self._judge()
+        # Samples that it is judged from are not kept any longer.
+        self.__dict__["_judge"] = partial(tuple, judged)
+        return judged
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is pickled: what was judged, without what it is judged from."""
-        return {**self.__dict__, "_judged": self._judged, "_judge": None}
+        return {**self.__dict__, "_judged": self._judged, "_judge": partial(tuple, self._judged)}
 
     def __repr__(self) -> str:
         named = [

@@ -143,7 +143,7 @@ class ClockCounts:
         periods = self._other / self._period
         turns = round(periods)
         by_turns = (turns - 1) * self._came
-        is_whole = abs(periods - turns) < WHOLE and self._came >= _ENOUGH
+        is_whole = turns > 1 and abs(periods - turns) < WHOLE and self._came >= _ENOUGH
         if not (self._is_thin and is_whole and abs(self.lost - by_turns) <= _TURNS * by_turns):
             return ""
         rate = f"{1 / self._other:.4g}"
