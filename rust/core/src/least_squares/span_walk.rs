@@ -20,7 +20,7 @@ use crate::least_squares::solutions::{Counts, Solutions};
 use crate::least_squares::span_factors::FactorStorage;
 use crate::least_squares::spans::{Run, Spans};
 use crate::record::samples::{all_usable, is_usable};
-use crate::simd::aligned::Aligned;
+use crate::simd::aligned::{Aligned, bring_near};
 use crate::simd::vectors::{Kernel, Lanes, MOST_LANES, apart, dispatch, dispatch_vectors};
 use crate::status::Status;
 
@@ -213,8 +213,11 @@ impl<H: Dimensions> Kernel for SpanKernel<'_, '_, '_, H> {
                 return;
             }
             for lane in 0..self.group.runs.len() {
-                let windows = self.group.runs[lane].windows.clone();
-                let some = windows.start + first..windows.end.min(windows.start + first + together);
+                // Runs take turns, each at places in memory of its own, whose beginnings no processor foresees.
+                let is_last = lane + 1 == self.group.runs.len();
+                let (next, after) = if is_last { (0, first + together) } else { (lane + 1, first) };
+                self.bring_near(self.group.runs[next].some(after, together));
+                let some = self.group.runs[lane].some(first, together);
                 if !some.is_empty() {
                     self.solve(simd, lane, some, storages);
                 }
@@ -299,6 +302,18 @@ impl<H: Dimensions> SpanKernel<'_, '_, '_, H> {
             }
         }
         true
+    }
+
+    /// Has what some windows need, and where their results will be, brought near while others are solved.
+    #[inline(always)]
+    fn bring_near(&self, some: Range<usize>) {
+        let (before, after) = self.group.spans.around_boundary(some.clone());
+        bring_near(before);
+        bring_near(after);
+        let elements = self.outputs.elements.of(some);
+        for values in self.outputs.values.iter().filter(|values| !values.is_empty()) {
+            bring_near(&values[elements.clone()]);
+        }
     }
 
     /// Solves some neighbouring windows of the run of a lane, whose factors are stored before its boundary and after it.

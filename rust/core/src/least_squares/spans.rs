@@ -124,6 +124,14 @@ impl Spans {
     }
 }
 
+impl Run {
+    /// Some neighbouring windows, as far as there are so many.
+    pub(crate) fn some(&self, first: usize, count: usize) -> Range<usize> {
+        let of = |window: usize| self.windows.end.min(self.windows.start + window);
+        of(first)..of(first + count)
+    }
+}
+
 impl SpanPlaces {
     /// The rows of the windows from one on up to before another, as many as there are lanes.
     #[inline(always)]
