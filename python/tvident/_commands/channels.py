@@ -121,9 +121,10 @@ def stated_in(file: str | None) -> str:
 
 
 def _stated(path: Path) -> str:
-    stated, wrong = stated_rate(path), no_rate_stated(path)
+    stated = stated_rate(path)
     if stated is not None:
         return f"; it may be --sample-rate {stated.rate:.10g}, as the file says: '{stated.words}'"
+    wrong = no_rate_stated(path)
     return f"; {wrong}" if wrong else ""
 
 

@@ -15,7 +15,7 @@ from tvident._files.channels import Channels, FileWarning, full_name
 from tvident._files.counts import counters
 from tvident._files.names import listed, printable
 from tvident._files.recordings import read
-from tvident._files.single_rates import check_alike, differ, no_rate_told, told_rates
+from tvident._files.single_rates import NOTABLE, check_alike, differ, no_rate_told, told_rates
 from tvident._files.stated import no_rate_stated, stated_rate
 from tvident._files.table import write_table
 from tvident._files.which_clock import (
@@ -32,9 +32,6 @@ from tvident._units import (
     times_in_seconds,
     with_unit,
 )
-
-_NOTABLE = 0.01
-"""Of a rate: times have few digits, and recorders round what they state."""
 
 
 @arguments.called_as("FileRecording({'angle [deg]': angle, 'torque [N m]': torque})")
@@ -341,7 +338,8 @@ def read_recording(path: str | Path, *, missing: float | Sequence[float] = ()) -
     if said:
         warnings.warn(f"{printable(path)}: {said}", FileWarning, stacklevel=2)
     recording = FileRecording(channels, sample_rate=rate, source=printable(path.name))
-    recording._no_rate = no_rate_stated(path)  # noqa: SLF001 - of this file
+    if rate is None:
+        recording._no_rate = no_rate_stated(path)  # noqa: SLF001 - of this file
     return recording
 
 
@@ -358,11 +356,11 @@ def said_otherwise(path: Path, channels: Mapping[str, npt.NDArray[Any]]) -> str:
     # Where they differ the sample rate says so.
     for name, rate in told.items() if not differ(told) else ():
         clock = recording._clock()  # noqa: SLF001 - of this class
-        if not (clock is not None and clock.unit) and may_be_of_other_unit(shown / rate, _NOTABLE):
+        if not (clock is not None and clock.unit) and may_be_of_other_unit(shown / rate, NOTABLE):
             return ""
         words = f"{printable(name, 40)} says {rate:.6g} Hz, which is used, and its times show {shown:.6g} Hz"
-        return "" if abs(shown / rate - 1) < _NOTABLE else f"{words}: check which is right"
+        return "" if abs(shown / rate - 1) < NOTABLE else f"{words}: check which is right"
     stated = stated_rate(path)
-    if stated is None or abs(shown / stated.rate - 1) < _NOTABLE:
+    if stated is None or abs(shown / stated.rate - 1) < NOTABLE:
         return ""
     return f"it states '{stated.words}', {stated.rate:.6g} Hz, and its times show {shown:.6g} Hz, which is used: check which is right"

@@ -17,8 +17,8 @@ _RATES = re.compile(r"fs|fsamp|fsample|sampl(e|ing)(rate|frequency)|rate")
 _PERIODS = re.compile(r"ts|dt|deltat|tsamp(le)?|sampl(e|ing)(time|period|interval)")
 """What they are called, without blanks and lines."""
 
-_NOTABLE = 0.01
-"""Of a rate: recorders round what they state."""
+NOTABLE = 0.01
+"""Of a rate: times have few digits, and recorders round what they state."""
 
 
 class RatesDifferError(ValueError):
@@ -50,7 +50,7 @@ def no_rate_told(channels: Mapping[str, npt.NDArray[Any]]) -> str:
 
 def differ(told: Mapping[str, float]) -> bool:
     """Return whether rates are not one."""
-    return bool(told) and max(told.values()) > (1 + _NOTABLE) * min(told.values())
+    return bool(told) and max(told.values()) > (1 + NOTABLE) * min(told.values())
 
 
 def check_alike(told: Mapping[str, float], source: str) -> None:

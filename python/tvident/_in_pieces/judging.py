@@ -82,7 +82,7 @@ class Judging:
         if not self.rows:
             return "no verdict: there are no rows", tuple(advice)
         judged = JudgedRows(self.rows, self.status, advice, self.settings, self.units)
-        is_asked = judged.is_doubted and not self.given.weighted and not any(SWAPPED in line for line in advice)
+        is_asked = judged.is_doubted and not any(SWAPPED in line for line in advice)
         judged = judged.with_cure(self._if_swapped() if is_asked else ())
         return judged.verdict(), tuple(judged.advice)
 

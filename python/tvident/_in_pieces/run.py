@@ -253,8 +253,6 @@ class Run:
 
     def _asked_if_swapped(self) -> list[str]:
         asked = self._asked
-        if asked.given.weighted:
-            return []
         return asked_if_swapped(asked.given, asked.given.equation, asked.recording.held, stretches_told(self._samples))
 
     def _some_rows(self, work: Work, means: Mapping[str, Mean]) -> Columns:

@@ -23,8 +23,8 @@ def stretches_asked(spans: Sequence[Span]) -> Sequence[Span]:
 def asked_if_swapped(
     given: Given, equation: Mapping[str, Any], read: Callable[[Sequence[Span]], Held], spans: Sequence[Span]
 ) -> list[str]:
-    """Return the question whether channels are swapped where that explains a stretch in weak form; nothing otherwise."""
-    if any(isinstance(equation.get(name), int | float) for name in COEFFICIENTS):
+    """Return the question whether channels are swapped where that explains a stretch in weak form; nothing otherwise, nor with weights."""
+    if given.weighted or any(isinstance(equation.get(name), int | float) for name in COEFFICIENTS):
         return []
     weak = replace(given, method=WeakForm(), equation=equation, settings=None)
     for first, end in stretches_asked(spans):
